@@ -1,1 +1,1 @@
-"""Missions in compiled loops, for training: the same as `alloc.problems.missions.simulation`, without a log."""
+"""Compiled simulation of missions, for training: equivalent to `alloc.problems.missions.simulation`, without a log."""

@@ -1,4 +1,4 @@
-"""A mission from event to event, compiled: see `alloc.problems.missions.simulation.simulation`."""
+"""Event loop of a mission, compiled: see `alloc.problems.missions.simulation.simulation`."""
 
 from collections.abc import Sequence
 
@@ -31,14 +31,15 @@ from alloc.problems.missions.simulation.motion import CLOSE
 
 COMPLETION, DEADLINE, EVENT, ARRIVAL, DELIVERY, RADIO = (int(turn) for turn in Turn)
 BETWEEN, WITHIN, TALKING, ORDERED = range(4)
-"""Where `advance` goes on: before the next hour, within it, after messages were asked for, after orders were."""
+"""Stages at which `advance` resumes: before the next hour, within it, after a request for messages or for orders."""
 
 
 @compiled_in_place
 def advance(state: MissionArrays) -> int:
-    """Go on to where agents may send messages (`MESSAGES`) or get orders (`ORDERS`), or to the end (`OVER`).
+    """Run to the next request for messages (`MESSAGES`) or orders (`ORDERS`), or to the end (`OVER`); return which.
 
-    Who gets orders stands in `deciding`, the first `head.deciding` of them. Who can send does if `Agent.speaks` is set.
+    The agents that get orders are the first `head.deciding` entries of `deciding`. Of those that can send messages,
+    agents with `Agent.speaks` do.
     """
     head, agents, agenda = state.head[0], state.agents, state.agenda
     if head.stage == TALKING:
@@ -69,7 +70,7 @@ def advance(state: MissionArrays) -> int:
 
 @inlined
 def take_first(state: MissionArrays) -> bool:
-    """Let the first entry of the agenda happen, unless it is void by now; return whether messages can be sent."""
+    """Process the first entry of the agenda, unless it is void by now; return whether messages can be sent."""
     head = state.head[0]
     pop(head, state.agenda)
     entry = state.agenda[head.entries]
@@ -96,7 +97,7 @@ def take_first(state: MissionArrays) -> bool:
 
 @compiled_in_place
 def arrive(state: MissionArrays, number: int) -> None:
-    """End a flight; who has nothing to do there is to decide."""
+    """End a flight; an agent with nothing to do at its goal has to decide."""
     agent = state.agents[number]
     task = agent.order_task if agent.order == 1 else NOBODY
     land(state, number)
@@ -108,7 +109,7 @@ def arrive(state: MissionArrays, number: int) -> None:
 
 @compiled_in_place
 def talk(state: MissionArrays) -> bool:
-    """Let all agents look around; return whether any can send a message."""
+    """Let all agents sense; return whether any can send a message."""
     head, can_send = state.head[0], False
     for number in range(len(state.agents)):
         agent = state.agents[number]
@@ -128,7 +129,7 @@ def talk(state: MissionArrays) -> bool:
 
 @compiled_in_place
 def send(state: MissionArrays) -> None:
-    """Let all send that can and will; when they can the next time stands on the agenda."""
+    """Send the messages of all agents that can and want to, and schedule the next ones."""
     head = state.head[0]
     slot = head.tick % len(state.sent)
     if send_all(state, slot):
@@ -140,7 +141,7 @@ def send(state: MissionArrays) -> None:
 
 @compiled_in_place
 def find_deciding(state: MissionArrays) -> bool:
-    """Fill in who is to get orders now, in their order in the mission; return whether there is anybody."""
+    """Fill in the agents that get orders now, in the order of the mission; return whether there are any."""
     head, agents = state.head[0], state.agents
     sort(state.marked, 0, head.marked)
     head.deciding = 0
@@ -161,7 +162,7 @@ def find_deciding(state: MissionArrays) -> bool:
 
 @compiled_in_place
 def look(state: MissionArrays) -> None:
-    """Let all who decide look around, unless they have done so in this turn."""
+    """Let all deciding agents sense, unless they have done so in this turn."""
     head = state.head[0]
     if not head.is_local:
         refresh(state)
@@ -178,13 +179,13 @@ def look(state: MissionArrays) -> None:
 
 @inlined
 def is_over(head: Head, agents: Sequence[Agent]) -> bool:
-    """Whether no task is open or to come, or nobody is left to do one."""
+    """Whether no task is open or still to come, or no agent is left, now or later."""
     return head.unfinished == 0 or head.failed == len(agents)
 
 
 @compiled_in_place
 def finish(state: MissionArrays) -> None:
-    """End the mission: whoever is in flight lands, and whoever returns is home."""
+    """End the mission: flights end, and agents that return fly home."""
     head = state.head[0]
     if not is_over(head, state.agents) and head.end < first_hour(head, state.agenda) < np.inf:
         head.hour = head.end
@@ -205,7 +206,7 @@ def finish(state: MissionArrays) -> None:
 
 @compiled_in_place
 def fly_home(agent: Agent, length: float) -> None:
-    """Count a flight that ends after the mission."""
+    """Book a flight home after the end of the mission."""
     agent.flown = 1
     agent.distance += length
     agent.energy += agent.energy_per_distance * length

@@ -1,4 +1,4 @@
-"""What is to come in a compiled mission: a heap in the order of hours, turns, and as it was put there."""
+"""Event queue of a compiled mission, called the agenda: a heap ordered by hour, turn and insertion."""
 
 from collections.abc import Sequence
 
@@ -14,13 +14,13 @@ ARRIVAL, COMPLETION, DEADLINE = int(Turn.ARRIVAL), int(Turn.COMPLETION), int(Tur
 
 @inlined
 def first_hour(head: Head, agenda: Sequence[Entry]) -> float:
-    """Return the hour of the first entry, ``inf`` where there is none."""
+    """Return the hour of the first entry, ``inf`` if there is none."""
     return agenda[0].hour if head.entries > 0 else np.inf
 
 
 @inlined
 def push(state: MissionArrays, hour: float, turn: int, subject: int, version: int) -> None:
-    """Put an entry on the agenda."""
+    """Add an entry; if the agenda is full, drop void ones first."""
     head, agenda = state.head[0], state.agenda
     if head.entries == len(agenda):
         drop_void(head, agenda, state.agents, state.tasks)
@@ -29,7 +29,7 @@ def push(state: MissionArrays, hour: float, turn: int, subject: int, version: in
 
 @compiled_in_place
 def insert(head: Head, agenda: Sequence[Entry], hour: float, turn: int, subject: int, version: int) -> None:
-    """Put an entry on an agenda that has room for it."""
+    """Add an entry to an agenda with room for it."""
     head.count += 1
     entry = agenda[head.entries]
     entry.hour, entry.turn, entry.count, entry.subject, entry.version = hour, turn, head.count, subject, version
@@ -39,7 +39,7 @@ def insert(head: Head, agenda: Sequence[Entry], hour: float, turn: int, subject:
 
 @compiled_in_place
 def pop(head: Head, agenda: Sequence[Entry]) -> None:
-    """Take the first entry off the agenda; it then stands behind the last one."""
+    """Remove the first entry; it is then stored behind the last one."""
     head.entries -= 1
     last = head.entries
     exchange(agenda[0], agenda[last])
@@ -57,7 +57,7 @@ def pop(head: Head, agenda: Sequence[Entry]) -> None:
 
 @compiled_in_place
 def rise(agenda: Sequence[Entry], place: int) -> None:
-    """Let an entry rise to where it belongs."""
+    """Sift an entry up to its place."""
     while place > 0:
         parent = (place - 1) // 2
         if not comes_before(agenda[place], agenda[parent]):
@@ -88,7 +88,7 @@ def exchange(one: Entry, other: Entry) -> None:
 
 @compiled_in_place
 def is_void(agents: Sequence[Agent], tasks: Sequence[Task], entry: Entry) -> bool:
-    """Whether an entry will change nothing any more."""
+    """Whether an entry no longer has an effect."""
     if entry.turn == ARRIVAL:
         return agents[entry.subject].flight != entry.version
     if entry.turn == COMPLETION:
@@ -99,7 +99,7 @@ def is_void(agents: Sequence[Agent], tasks: Sequence[Task], entry: Entry) -> boo
 
 @compiled_in_place
 def drop_void(head: Head, agenda: Sequence[Entry], agents: Sequence[Agent], tasks: Sequence[Task]) -> None:
-    """Take all void entries off a full agenda."""
+    """Remove all void entries from a full agenda."""
     kept = 0
     for place in range(head.entries):
         if not is_void(agents, tasks, agenda[place]):

@@ -11,7 +11,7 @@ _30, _27, _31, _11 = np.uint64(30), np.uint64(27), np.uint64(31), np.uint64(11)
 
 @compiled_in_place
 def keyed(state: int, part: int) -> int:
-    """Return the state of the hash after another part of the key; it begins at 0 with `first_key`."""
+    """Return the state of the hash after another part of the key; `first_key` starts it."""
     value = (np.uint64(state) ^ np.uint64(part)) + _GOLDEN
     value = (value ^ (value >> _30)) * _FIRST
     value = (value ^ (value >> _27)) * _SECOND
@@ -20,7 +20,7 @@ def keyed(state: int, part: int) -> int:
 
 @compiled_in_place
 def first_key(purpose: int) -> int:
-    """Return the state of the hash after what the number is for."""
+    """Return the state of the hash after the first part of a key, the purpose of the number."""
     return keyed(np.int64(_GOLDEN), purpose)  # type: ignore[arg-type]
 
 

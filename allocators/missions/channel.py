@@ -18,7 +18,7 @@ from alloc.problems.missions.simulation.reports import BYTES_OF_AGENT, BYTES_OF_
 
 @compiled_in_place
 def is_silent(state: MissionArrays, number: int) -> bool:
-    """Whether an agent can neither send nor hear now."""
+    """Whether an agent can neither send nor receive now."""
     head = state.head[0]
     for place in range(head.silences):
         event = state.events[state.silences[place]]
@@ -36,7 +36,7 @@ def is_silent(state: MissionArrays, number: int) -> bool:
 
 @compiled_in_place
 def send_all(state: MissionArrays, slot: int) -> bool:
-    """Send a message of each agent that can and will, all that it knows; return whether any is heard."""
+    """Send the knowledge of all agents that can and want to send; return whether any message is received."""
     head, agents, speaks = state.head[0], state.agents, state.speaks
     for number in range(len(agents)):
         agent = agents[number]
@@ -60,7 +60,7 @@ def send_all(state: MissionArrays, slot: int) -> bool:
 
 @compiled_in_place
 def gather_speakers(state: MissionArrays) -> int:
-    """Fill in where those are that send now, by the cells of the grid; return how many they are."""
+    """Fill in the senders and their places by the cells of the grid; return the number of senders."""
     places, speakers, to, at, count = state.places, state.speakers, state.speaker_places, state.speaker_cells, 0
     for cell in range(len(at) - 1):
         for place in range(state.cells[cell], state.cells[cell + 1]):
@@ -75,7 +75,7 @@ def gather_speakers(state: MissionArrays) -> int:
 
 @compiled_in_place
 def count(hours: FloatArray) -> int:
-    """Return of how many tasks anything is known."""
+    """Return the number of known tasks."""
     known = 0
     for one in range(len(hours)):
         known += hours[one] >= 0
@@ -84,14 +84,14 @@ def count(hours: FloatArray) -> int:
 
 @compiled_in_place
 def copy(row: FloatArray, to: FloatArray) -> None:
-    """Copy a row on tasks."""
+    """Copy a row with one value for each task."""
     for one in range(len(row)):
         to[one] = row[one]
 
 
 @compiled_in_place
 def keep(state: MissionArrays, slot: int, number: int) -> None:
-    """Keep what an agent sends, but for what nobody uses any more."""
+    """Store the message of an agent, without reports that are too old for any policy."""
     copy(state.task_hour[number], state.sent_task_hour[slot, number])
     copy(state.task_left[number], state.sent_task_left[slot, number])
     known, told = state.known_report[number], state.sent_report[slot, number]
@@ -102,9 +102,9 @@ def keep(state: MissionArrays, slot: int, number: int) -> None:
 
 @compiled_in_place
 def find_senders(state: MissionArrays, slot: int) -> bool:
-    """Fill in whom each agent will hear of those that send now; return whether anybody hears anybody.
+    """Fill in the senders whose messages each agent will receive; return whether there are any.
 
-    What is lost in bursts counts as heard in that.
+    For the returned value, messages lost in bursts count as received.
     """
     head, found, begin = state.head[0], False, 0
     for number in range(len(state.agents)):
@@ -124,7 +124,7 @@ def find_senders(state: MissionArrays, slot: int) -> bool:
 
 @compiled_in_place
 def find_near(state: MissionArrays, number: int, end: int, near: Numbers) -> int:
-    """Fill in who sends within the radius of an agent, but for those that are lost; return where they end."""
+    """Append the senders within an agent's radius whose messages are not lost; return the end of the list."""
     head, here, room = state.head[0], place_of(state.agents[number], state.head[0].hour), (state.is_near, state.near)
     radius, cells = head.radius + TOLERANCE, state.speaker_cells
     first, last, low, high = cells_near(head, here[0], here[1], radius)
@@ -139,13 +139,13 @@ def find_near(state: MissionArrays, number: int, end: int, near: Numbers) -> int
                 key = keyed(keyed(keyed(head.loss_key, other), number), head.tick)
                 is_heard &= fraction(key) >= head.loss
             near[end] = other
-            end += is_heard  # without a branch, which nobody could foretell
+            end += is_heard  # branchless: a branch could not be predicted
     return end
 
 
 @compiled_in_place
 def lose_in_bursts(head: Head, senders: Numbers, begin: int, end: int, hearer: int, links: Numbers) -> int:
-    """Lose messages of this tick to one agent by the state of each link; return where those end that are left."""
+    """Remove senders whose messages to an agent are lost in bursts in this tick; return the end of the list."""
     kept = begin
     for place in range(begin, end):
         sender = senders[place]
@@ -158,7 +158,7 @@ def lose_in_bursts(head: Head, senders: Numbers, begin: int, end: int, hearer: i
 
 @compiled_in_place
 def is_link_bad(head: Head, sender: int, hearer: int, links: Numbers) -> bool:
-    """Whether a link is bad now; a Markov chain over all messages up to this one, whether sent or not."""
+    """Whether a link is bad now: a Markov chain over all message numbers up to this one, sent or not."""
     key = keyed(keyed(head.burst_key, sender), hearer)
     share = head.burst_bad / (head.burst_good + head.burst_bad)
     is_bad = links[sender, hearer] & 1
@@ -172,10 +172,10 @@ def is_link_bad(head: Head, sender: int, hearer: int, links: Numbers) -> bool:
 
 @compiled_in_place
 def deliver(state: MissionArrays, slot: int) -> None:
-    """Let all hear what was sent to them."""
+    """Deliver the messages of a slot to all their receivers."""
     head, senders = state.head[0], state.senders[slot]
     for place in range(len(state.agents)):
-        number = state.in_cells[place]  # those near each other in turn: they hear the same
+        number = state.in_cells[place]  # neighbours in succession: they hear the same messages
         if not senders[number]:
             continue
         is_there = IDLE <= state.agents[number].status <= WORKING
@@ -189,7 +189,7 @@ def deliver(state: MissionArrays, slot: int) -> None:
 
 @compiled_in_place
 def hear_of_tasks(state: MissionArrays, slot: int, number: int) -> None:
-    """Let an agent take over what is newer in the messages that it hears than what it knows of tasks."""
+    """Let an agent adopt newer knowledge of tasks from the messages that it receives."""
     first = state.first_sender[slot, number]
     hours, left = state.task_hour[number], state.task_left[number]
     for place in range(first, first + state.senders[slot, number]):
@@ -199,7 +199,7 @@ def hear_of_tasks(state: MissionArrays, slot: int, number: int) -> None:
 
 @compiled_in_place
 def take_over(told_hour: FloatArray, told: FloatArray, hour: FloatArray, known: FloatArray) -> None:
-    """Take over from one message what is newer than what one agent knows."""
+    """Adopt the values of a message that are newer than an agent's own."""
     for one in range(len(hour)):
         if told_hour[one] > hour[one]:
             hour[one] = told_hour[one]

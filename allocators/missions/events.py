@@ -1,4 +1,4 @@
-"""What the events of a mission do, compiled: see `alloc.problems.missions.simulation.changes`."""
+"""Effects of the events of a mission, compiled: see `alloc.problems.missions.simulation.changes`."""
 
 from alloc.allocators.missions.layout import (
     AWAY,
@@ -16,12 +16,12 @@ from alloc.allocators.missions.orders import close, let_decide, note_agent, note
 from alloc.allocators.runtime.compiled import compiled_in_place
 
 JOINS, FAILS, RECALLED, RETURNS, RECHARGES, APPEARS, CANCELS, CHANGES, SILENT = range(9)
-"""What happens, in the order of `alloc.problems.missions.events.EventKind`."""
+"""Kinds of events, in the order of `alloc.problems.missions.events.EventKind`."""
 
 
 @compiled_in_place
 def happen(state: MissionArrays, number: int) -> None:
-    """Let an event happen now; what it is about may have ended before, and then nothing changes."""
+    """Apply an event now; if its agent has failed or its task is closed, nothing changes."""
     event, head = state.events[number], state.head[0]
     head.is_news = 1
     if event.kind == SILENT:

@@ -1,7 +1,7 @@
-"""Who is near: a grid of cells, by which only those are looked at that may be within a radius; compiled.
+"""Search for agents within a radius by a grid of cells, compiled.
 
-It says where agents were at some hour. Until the fastest of them may have left its cell, those near a place are found
-in cells that are so much further off.
+The grid holds the agents' places at some hour. Later, the search radius is increased by the distance that the fastest
+agent may have flown since.
 """
 
 import math
@@ -18,14 +18,14 @@ from alloc.problems.fields import BoolArray, FloatArray, IntArray
 from alloc.problems.missions.mission import Mission
 
 FEW = 100
-"""Agents up to which all are looked at, instead of those in the cells of a grid."""
+"""Number of agents up to which all are examined, without a grid."""
 
 SLACK = 1e-6
-"""By how much more of itself than by its speed an agent may have moved, as numbers are rounded."""
+"""Relative increase of the distance that an agent may have flown, to allow for rounding errors."""
 
 
 def divide(mission: Mission, head: NDArray[np.void]) -> Numbers:
-    """Return room for the cells of a grid, which the head then describes; one cell for few, or at unknown places."""
+    """Describe the grid in the head, and return its array of cells; one cell for few agents, or unknown places."""
     places = [mission.instance.start_position, mission.instance.task_position, mission.instance.bases.position]
     low, high = np.array(mission.area)[:, :2]
     n, width = mission.instance.n, float((high - low).max())
@@ -40,24 +40,24 @@ def divide(mission: Mission, head: NDArray[np.void]) -> Numbers:
 
 
 Found = tuple[BoolArray, Numbers]
-"""Room for which places are near: `is_near` and `near` of `MissionArrays`."""
+"""Output arrays of a search: `is_near` and `near` of `MissionArrays`."""
 
 
 @inlined
 def drift(head: Head) -> float:
-    """Return how far an agent may be from where the grid says; NaN or infinite where the grid says nothing."""
+    """Return how far an agent may be from its place in the grid; NaN or infinite if the grid is not usable."""
     return head.fastest * (head.hour - head.located) * (1 + SLACK)
 
 
 @compiled_in_place
 def cell_along(value: float, begin: float, side: float, count: int) -> int:
-    """Return the column, or row, of a coordinate; those outside belong to the first or last one."""
+    """Return the column or row of a coordinate, clipped to the grid."""
     return 0 if count == 1 else int(min(max((value - begin) / side, 0.0), count - 1.0))
 
 
 @inlined
 def cells_near(head: Head, x: float, y: float, reach: float) -> tuple[int, int, int, int]:
-    """Return the first and last column, and the first and last row, in which there may be agents so near."""
+    """Return the first and last column, and the first and last row, that may contain agents within `reach`."""
     first = cell_along(x - reach, head.left, head.side, head.columns)
     last = cell_along(x + reach, head.left, head.side, head.columns)
     low = cell_along(y - reach, head.low, head.side, head.rows)
@@ -66,7 +66,7 @@ def cells_near(head: Head, x: float, y: float, reach: float) -> tuple[int, int, 
 
 @compiled_in_place
 def locate(head: Head, agents: Sequence[Agent], places: FloatArray, cells: Numbers, in_cells: Numbers) -> None:
-    """Fill in where all agents are now, by cells."""
+    """Fill the grid with the present places of all agents."""
     head.located = head.hour
     if len(cells) == 2:
         for number in range(len(agents)):
@@ -100,7 +100,7 @@ def cell_of(head: Head, place: Point) -> int:
 def find_within(
     is_manhattan: int, reach: float, to: Point, places: FloatArray, begin: int, end: int, room: Found
 ) -> int:
-    """Find those of some places that lie within reach of one, or at unknown places; return how many there are.
+    """Find the places that are within reach of a point, or unknown; return their number.
 
     Parameters
     ----------
@@ -109,9 +109,9 @@ def find_within(
     to : tuple of float
     places : ndarray, shape (3, places)
     begin, end : int
-        Which of these are looked at.
+        Range of the places to examine.
     room : Found
-        The numbers of those found are filled in.
+        Output: the indices of the places found.
     """
     is_near, near = room
     at_x, at_y, at_z = places[0], places[1], places[2]
@@ -127,13 +127,13 @@ def find_within(
 
 @inlined
 def length(is_manhattan: int, dx: float, dy: float, dz: float) -> float:
-    """Return the length of a way, NaN where an end is unknown."""
+    """Return the length of a difference vector, NaN if it has unknown coordinates."""
     return abs(dx) + abs(dy) + abs(dz) if is_manhattan else math.sqrt(dx * dx + dy * dy + dz * dz)
 
 
 @compiled_in_place
 def sort(numbers: IntArray, begin: int, count: int) -> None:
-    """Sort a part of an array: by insertion over ever smaller gaps."""
+    """Sort a part of an array by Shell sort."""
     gap = count // 2
     while gap > 0:
         for place in range(begin + gap, begin + count):

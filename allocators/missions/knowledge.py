@@ -1,4 +1,4 @@
-"""What agents see, compiled: see `alloc.problems.missions.simulation.awareness`."""
+"""Sensing of agents, compiled: see `alloc.problems.missions.simulation.awareness`."""
 
 from collections.abc import Sequence
 
@@ -15,13 +15,13 @@ from alloc.problems.distances.reach import TOLERANCE
 
 @compiled_in_place
 def look_around(state: MissionArrays, is_located: bool) -> None:
-    """Let those that are to look around see all tasks and all agents in the mission within the sensing radius.
+    """Let the agents listed in `lookers` sense all tasks and agents of the mission within their sensing radius.
 
     Parameters
     ----------
     state : MissionArrays
     is_located : bool
-        Whether the grid is to say where agents are now.
+        Whether the grid is to be filled with the agents' present places.
     """
     head = state.head[0]
     if head.reports + len(state.agents) > head.limit:
@@ -41,7 +41,7 @@ def look_around(state: MissionArrays, is_located: bool) -> None:
 
 @compiled_in_place
 def note_tasks(state: MissionArrays) -> None:
-    """Note what can be seen of each task now; NaN where it is to come."""
+    """Note what sensing each task yields now, NaN for tasks still to come."""
     head = state.head[0]
     for number in range(len(state.tasks)):
         task = state.tasks[number]
@@ -51,7 +51,7 @@ def note_tasks(state: MissionArrays) -> None:
 
 @compiled_in_place
 def see_tasks(state: MissionArrays, number: int, here: Point) -> None:
-    """Take notice of the tasks that an agent sees."""
+    """Update an agent's knowledge of the tasks that it senses."""
     head, hours, left, now = state.head[0], state.task_hour[number], state.task_left[number], state.task_now
     hour, is_manhattan, sensing = head.hour, head.is_manhattan, head.sensing + TOLERANCE
     at_x, at_y, at_z = state.sites[0], state.sites[1], state.sites[2]
@@ -59,19 +59,19 @@ def see_tasks(state: MissionArrays, number: int, here: Point) -> None:
     for at in range(len(now)):
         is_far = length(is_manhattan, at_x[at] - x, at_y[at] - y, at_z[at] - z) > sensing
         is_seen = (not is_far) & (now[at] == now[at])
-        hours[at] = hour if is_seen else hours[at]  # without a branch, so that several are compared at once
+        hours[at] = hour if is_seen else hours[at]  # branchless, so that the loop is vectorised
         left[at] = now[at] if is_seen else left[at]
 
 
 @compiled_in_place
 def seen_of(head: Head, agents: Sequence[Agent], task: Task, number: int) -> float:
-    """Return the work left of a task, minus its status where it is closed."""
+    """Return the work left of a task, or minus its status if it is closed."""
     return work_left(head, agents, task, number) if task.status == OPEN else -float(task.status)
 
 
 @compiled_in_place
 def see_agents(state: MissionArrays, number: int, here: Point, is_located: bool) -> None:
-    """Take notice of the agents that an agent sees; `is_located` if the grid says where they are now."""
+    """Update an agent's knowledge of the agents that it senses; `is_located` if the grid has their present places."""
     head, room = state.head[0], (state.is_near, state.near)
     sensing, is_manhattan = head.sensing + TOLERANCE, head.is_manhattan
     reach = sensing if is_located else (sensing + drift(head)) * (1 + SLACK)
@@ -94,7 +94,7 @@ def see_agents(state: MissionArrays, number: int, here: Point, is_located: bool)
 
 @compiled_in_place
 def refresh(state: MissionArrays) -> None:
-    """Let all know all that is so now."""
+    """Give all agents full knowledge of the present state."""
     head = state.head[0]
     for number in range(len(state.agents)):
         if state.agents[number].status != ABSENT:
@@ -107,6 +107,6 @@ def refresh(state: MissionArrays) -> None:
 
 @compiled_in_place
 def tell_all(state: MissionArrays, number: int) -> None:
-    """Let all know what is so of an agent now."""
+    """Give all agents the present state of one agent."""
     write_report(state, state.agents[number], state.reports[number + 1])
     learn(state, 0, number, number + 1)

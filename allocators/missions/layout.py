@@ -12,27 +12,27 @@ from alloc.problems.fields import BoolArray, FloatArray, IntArray
 Numbers = NDArray[np.int32]
 
 ABSENT, IDLE, FLYING, WORKING, AWAY, FAILED = range(6)
-"""What an agent does, in the order of `AgentStatus`."""
+"""Status of an agent, in the order of `AgentStatus`."""
 
 TO_COME, OPEN, DONE, MISSED, CANCELLED = range(5)
-"""What has become of a task, in the order of `TaskStatus`."""
+"""Status of a task, in the order of `TaskStatus`."""
 
 STAY, TO_TASK, TO_PLACE = range(3)
-"""What an order is: to stay, to go to a task, or to a place."""
+"""Kinds of orders: stay, go to a task, go to a place."""
 
 OVER, MESSAGES, ORDERS = range(3)
-"""What a mission waits for: nothing any more, messages to be sent, or orders."""
+"""What a mission waits for: nothing, as it is over; messages; or orders."""
 
 NOBODY = -1
-"""No agent, no task; what is known of a closed task is minus its status instead of the work left."""
+"""No agent or no task. (The known work left of a closed task is minus its status.)"""
 
 
 class MissionArrays(NamedTuple):
-    """A mission as it goes on, for compiled code.
+    """State of a mission for compiled code.
 
-    Row r of what is known is that of agent r, or the only one where all know all. n agents, m tasks, k messages of each
-    agent on the air at once at the most. Rows on tasks have columns behind these, of which nothing is known. Report 0
-    is that of nobody: it stands where nothing is known of an agent.
+    There are n agents, m tasks and at most k messages of each agent in transit. Row r of a knowledge array is that of
+    agent r; with full knowledge there is only one row. Rows with values of tasks are padded with columns of unknown
+    tasks. Report 0 stands for no report of an agent.
 
     Attributes
     ----------
@@ -40,43 +40,43 @@ class MissionArrays(NamedTuple):
     agents, tasks : records, shape (n,) and (m,)
     events, agenda, reports : records
     renumbered : ndarray of int, shape (reports,)
-        New numbers of reports, when those are dropped that nobody knows any more.
+        New numbers of reports, when reports that no agent knows any more are dropped.
     allowed : ndarray of bool, shape (n, m)
-        Which agent may do which task, by its list and its skills.
+        Which agents may do which tasks, by lists and skills.
     area : ndarray, shape (2, 3)
-        Least and largest coordinates of all places, which all know.
+        Smallest and largest coordinates of all places, which all agents know.
     sites : ndarray, shape (3, m)
-        Where tasks are.
+        Positions of tasks.
     task_now : ndarray, shape (m,)
-        What can be seen of each task now: the work left, minus its status where it is closed, NaN where it is to come.
+        Work left of each task now, minus its status if it is closed, NaN if it is still to come.
     places : ndarray, shape (3, n)
-        Where agents are at the hour of the grid, in the order of `in_cells`.
+        Positions of agents at the hour of the grid, in the order of `in_cells`.
     cells, in_cells : ndarray of int, shape (cells + 1,) and (n,)
-        Agents by the cells of the grid, and where those of each cell begin.
-    is_near : ndarray of bool, shape (n or m,)
-        Which places are near another one, of agents by cells or of tasks; as many as there are of the more numerous.
-    near : ndarray of int, shape (n or m,)
-        The numbers of those that are.
+        Start of each cell of the grid in `in_cells`, and the agents sorted by cell.
+    is_near : ndarray of bool, shape (max(n, m),)
+        Scratch: whether each place, of agents by cell or of tasks, is near a given one.
+    near : ndarray of int, shape (max(n, m),)
+        Scratch: the indices of those that are.
     speaks : ndarray of bool, shape (n,)
-        Who sends a message.
+        Whether each agent sends a message.
     speakers, speaker_places, speaker_cells : ndarray
-        Those who do, where they are, and where those of each cell begin, as `in_cells`, `places` and `cells` of all.
+        Agents that do, with the layout of `in_cells`, `places` and `cells`.
     task_hour, task_left : ndarray, shape (rows, m)
-        Hour at which an agent's knowledge of a task was true, -1 where it knows nothing, and the work left then.
+        Hour of an agent's knowledge of a task, -1 if unknown, and the work left at that hour.
     known, known_report : ndarray of int, shape (rows,) and (rows, n)
-        Of how many agents an agent knows, and the number of the newest report of each.
+        Number of agents of which an agent knows, and the number of its newest report of each.
     heard_of : ndarray of int, shape (rows, words)
-        A bit for each agent of which an agent has ever known, where that may be forgotten.
+        A bit for each agent of which an agent has ever known, if old reports may be forgotten.
     sent_task_hour, sent_task_left, sent, sent_report, sent_of : ndarray
-        The same, as it was when it was sent, by message and agent.
+        Copies of these arrays when sent, by message and sender.
     senders, first_sender, sender : ndarray of int, shape (k, n), (k, n) and (k, n * n)
-        How many messages an agent hears, and who sent them: by number, from its first one on.
+        Number of messages that an agent receives, the start of its part of `sender`, and the senders.
     links : ndarray of int, shape (n, n)
-        State of each link, with losses in bursts: twice the number of messages up to one, and 1 if it was bad then.
+        State of each link, with burst losses: twice the number of messages up to the last update, plus 1 if it was bad.
     silences : ndarray of int
-        Events by which there is silence.
+        Events with silences.
     lookers, marked, deciding, changed_agents, changed_tasks : ndarray of int
-        Agents that are to look around, that are to decide, and get orders now; what the agenda has to take notice of.
+        Agents that are to sense, that are to decide, and that get orders now; agents and tasks to be rescheduled.
     """
 
     head: Sequence[Head]

@@ -16,7 +16,7 @@ Point = tuple[float, float, float]
 
 @compiled_in_place
 def distance_between(is_manhattan: int, one: Point, other: Point) -> float:
-    """Return the distance of two places, 0 where one is unknown."""
+    """Return the distance between two places, 0 if one is unknown."""
     x, y, z = one[0] - other[0], one[1] - other[1], one[2] - other[2]
     distance = abs(x) + abs(y) + abs(z) if is_manhattan else math.sqrt(x * x + y * y + z * z)
     return 0.0 if math.isnan(distance) else distance
@@ -24,14 +24,14 @@ def distance_between(is_manhattan: int, one: Point, other: Point) -> float:
 
 @compiled_in_place
 def flown_share(agent: Agent, hour: float) -> float:
-    """Return the share of its flight that an agent has behind it."""
+    """Return the share of an agent's flight that has been flown."""
     hours = agent.arrives - agent.departs
     return 1.0 if hours <= 0 else min(1.0, max(0.0, (hour - agent.departs) / hours))
 
 
 @compiled_in_place
 def place_of(agent: Agent, hour: float) -> Point:
-    """Return where an agent is now."""
+    """Return the present place of an agent."""
     if agent.flight == 0 or math.isnan(agent.x) or math.isnan(agent.goal_x):
         return agent.x, agent.y, agent.z
     share = flown_share(agent, hour)
@@ -44,7 +44,7 @@ def place_of(agent: Agent, hour: float) -> Point:
 
 @compiled_in_place
 def battery_of(agent: Agent, hour: float) -> float:
-    """Return the battery of an agent now."""
+    """Return the present battery of an agent."""
     if agent.flight == 0:
         return agent.battery
     return agent.battery - agent.energy_per_distance * (agent.length * flown_share(agent, hour))
@@ -64,7 +64,7 @@ def can_fly(is_manhattan: int, agent: Agent, place: Point, battery: float, goal:
 
 @compiled_in_place
 def depart(head: Head, agent: Agent, goal: Point) -> None:
-    """Let an agent that stands still begin a flight."""
+    """Begin the flight of a stationary agent."""
     agent.length = distance_between(head.is_manhattan, (agent.x, agent.y, agent.z), goal)
     agent.goal_x, agent.goal_y, agent.goal_z = goal
     agent.departs, agent.arrives = head.hour, head.hour + agent.length / agent.speed
@@ -74,7 +74,7 @@ def depart(head: Head, agent: Agent, goal: Point) -> None:
 
 @compiled_in_place
 def break_off(agent: Agent, hour: float) -> None:
-    """End a flight, if there is one, where the agent is now."""
+    """End a flight, if there is one, at the agent's present place."""
     if agent.flight == 0:
         return
     share = flown_share(agent, hour)
@@ -95,7 +95,7 @@ def break_off(agent: Agent, hour: float) -> None:
 
 @compiled_in_place
 def begin_work(head: Head, agents: Sequence[Agent], tasks: Sequence[Task], number: int, at: int) -> None:
-    """Let an agent that is at an open task join those who work there."""
+    """Let an agent at an open task start to work there."""
     agent, task = agents[number], tasks[at]
     bring_up_to_date(head, agents, task, at)
     agent.previous, agent.next = task.last, NOBODY
@@ -111,7 +111,7 @@ def begin_work(head: Head, agents: Sequence[Agent], tasks: Sequence[Task], numbe
 
 @compiled_in_place
 def stop_work(head: Head, agents: Sequence[Agent], tasks: Sequence[Task], number: int) -> None:
-    """Let an agent leave the task where it works, if there is one."""
+    """Let an agent stop working, if it does."""
     agent = agents[number]
     if agent.task == NOBODY:
         return
@@ -131,7 +131,7 @@ def stop_work(head: Head, agents: Sequence[Agent], tasks: Sequence[Task], number
 
 @compiled_in_place
 def ability_at(agents: Sequence[Agent], task: Task) -> float:
-    """Return the ability of all who work at a task."""
+    """Return the total ability of the agents that work at a task."""
     total, number = 0.0, task.first
     while number != NOBODY:
         total += agents[number].ability
@@ -141,7 +141,7 @@ def ability_at(agents: Sequence[Agent], task: Task) -> float:
 
 @compiled_in_place
 def bring_up_to_date(head: Head, agents: Sequence[Agent], task: Task, number: int) -> None:
-    """Count what was worked, or grew, on an open task since it was brought up to date."""
+    """Update the work left of an open task to the present hour by the work done, or growth, since its last update."""
     hour = head.hour
     if task.status == OPEN:
         if task.first != NOBODY:
@@ -157,7 +157,7 @@ def bring_up_to_date(head: Head, agents: Sequence[Agent], task: Task, number: in
 
 @compiled_in_place
 def work_left(head: Head, agents: Sequence[Agent], task: Task, number: int) -> float:
-    """Return the work left of a task now, without a change to it."""
+    """Return the present work left of a task, without updating it."""
     hour = head.hour
     if task.status == OPEN and task.first != NOBODY:
         return max(0.0, task.left - ability_at(agents, task) * paced_hours(head, number, task.since, hour))
@@ -168,7 +168,7 @@ def work_left(head: Head, agents: Sequence[Agent], task: Task, number: int) -> f
 
 @compiled_in_place
 def completion_hour(head: Head, agents: Sequence[Agent], task: Task, number: int) -> float:
-    """Return when a task that is up to date will be done if nothing changes; ``inf`` if it will not in the mission."""
+    """Return the hour at which an up-to-date task is done if nothing changes; ``inf`` if not within the mission."""
     needed = task.left / ability_at(agents, task)
     if not head.has_pace:
         return task.since + needed
@@ -186,7 +186,7 @@ def completion_hour(head: Head, agents: Sequence[Agent], task: Task, number: int
 
 @compiled_in_place
 def paced_hours(head: Head, number: int, begin: float, end: float) -> float:
-    """Return the hours between two hours, each counted as often as the pace says."""
+    """Return the integral of a task's pace factor between two hours."""
     if not head.has_pace:
         return end - begin
     total = 0.0
@@ -200,6 +200,6 @@ def paced_hours(head: Head, number: int, begin: float, end: float) -> float:
 
 @compiled_in_place
 def pace_factor(head: Head, number: int, period: int) -> float:
-    """Return how fast any group works on a task in a period."""
+    """Return the pace factor of a task in a period."""
     chance = fraction(keyed(keyed(head.pace_key, number), period))
     return head.pace_low + (head.pace_high - head.pace_low) * chance

@@ -1,4 +1,4 @@
-"""What orders do to agents, and what ends a task, compiled: see `alloc.problems.missions.simulation.changes`."""
+"""Effects of orders, and closing of tasks, compiled: see `alloc.problems.missions.simulation.changes`."""
 
 from alloc.allocators.missions.agenda import push
 from alloc.allocators.missions.knowledge import tell_all
@@ -39,7 +39,7 @@ ARRIVAL, COMPLETION = int(Turn.ARRIVAL), int(Turn.COMPLETION)
 
 @compiled_in_place
 def note_task(state: MissionArrays, number: int) -> None:
-    """Note that the work of a task may end at another hour."""
+    """Note that the completion of a task has to be rescheduled."""
     task, head = state.tasks[number], state.head[0]
     if number != NOBODY and not task.changed:
         task.changed = 1
@@ -49,7 +49,7 @@ def note_task(state: MissionArrays, number: int) -> None:
 
 @compiled_in_place
 def note_agent(state: MissionArrays, number: int, left: int) -> None:
-    """Note that the flight of an agent may end at another hour, and work at its task and the one that it left."""
+    """Note that an agent's arrival, and the completion of its task and of the one it left, have to be rescheduled."""
     agent, head = state.agents[number], state.head[0]
     if not agent.changed:
         agent.changed = 1
@@ -61,7 +61,7 @@ def note_agent(state: MissionArrays, number: int, left: int) -> None:
 
 @compiled_in_place
 def let_decide(state: MissionArrays, number: int) -> None:
-    """Note that an agent is to decide as soon as all of this hour has happened."""
+    """Note that an agent has to decide once everything at this hour has happened."""
     agent, head = state.agents[number], state.head[0]
     if not agent.decides:
         agent.decides = 1
@@ -71,7 +71,7 @@ def let_decide(state: MissionArrays, number: int) -> None:
 
 @compiled_in_place
 def balance(state: MissionArrays) -> None:
-    """Put the ends of flights and work of all that changed on the agenda."""
+    """Schedule the arrivals of all changed agents and the completions of all changed tasks."""
     head = state.head[0]
     agents, tasks = head.changed_agents, head.changed_tasks
     head.changed_agents = head.changed_tasks = 0
@@ -94,7 +94,7 @@ def balance(state: MissionArrays) -> None:
 
 @compiled_in_place
 def close(state: MissionArrays, number: int, status: int) -> None:
-    """Let a task be done, missed or cancelled now; who worked there is idle, and is to decide."""
+    """Close a task as done, missed or cancelled; its agents become idle and have to decide."""
     task, head = state.tasks[number], state.head[0]
     bring_up_to_date(head, state.agents, task, number)
     if status == DONE:
@@ -120,7 +120,7 @@ def close(state: MissionArrays, number: int, status: int) -> None:
 
 @compiled_in_place
 def stand_still(state: MissionArrays, number: int) -> None:
-    """Let an agent end its flight or its work where it is."""
+    """End an agent's flight or work at its present place."""
     stop_work(state.head[0], state.agents, state.tasks, number)
     break_off(state.agents[number], state.head[0].hour)
 
@@ -138,25 +138,25 @@ def land(state: MissionArrays, number: int) -> None:
 
 @inlined
 def order(state: MissionArrays, number: int, kind: int, task: int, place: Point) -> bool:
-    """Give an agent an order; return whether it is followed, or done already.
+    """Give an agent an order; return whether it is followed, or already in force.
 
     Parameters
     ----------
     state : MissionArrays
     number : int
-        The agent.
+        Index of the agent.
     kind : int
         `STAY`, `TO_TASK` or `TO_PLACE`.
     task : int
     place : tuple of float
-        Where there is no task.
+        Goal of `TO_PLACE`.
     """
     return is_same(state.agents[number], kind, task, place) or follow(state, number, kind, task, place)
 
 
 @compiled_in_place
 def follow(state: MissionArrays, number: int, kind: int, task: int, place: Point) -> bool:
-    """Give an agent an order that is not its last one; return whether it is followed."""
+    """Give an agent an order that differs from its last one; return whether it is followed."""
     agent = state.agents[number]
     left = agent.task
     if not obey(state, number, kind, task, place):
@@ -187,7 +187,7 @@ def is_same(agent: Agent, kind: int, task: int, place: Point) -> bool:
 
 @compiled_in_place
 def obey(state: MissionArrays, number: int, kind: int, task: int, place: Point) -> bool:
-    """Let an agent begin to follow an order; return whether it can."""
+    """Let an agent start to follow an order; return whether it can."""
     agent, head = state.agents[number], state.head[0]
     if not IDLE <= agent.status <= WORKING:
         return False

@@ -1,4 +1,4 @@
-"""A mission as arrays for compiled code, and its measures when it is over."""
+"""Conversion of a mission into arrays for compiled code, and its measures at the end."""
 
 import math
 from dataclasses import replace
@@ -26,43 +26,43 @@ from alloc.problems.vocabulary import GEOGRAPHIC, MANHATTAN, Knowledge
 Records = NDArray[np.void]
 
 MOST_KNOWN = 50_000_000
-"""Pairs of agents and tasks, each once for an agent and once for a message on the air, up to which missions are run."""
+"""Limit on the number of values that agents know of tasks, including copies in messages in transit."""
 
 MOST_PAIRS = 1_000_000_000
-"""Likewise of agents, that may know each other: 4 bytes of memory for each that does."""
+"""The same limit for values on other agents; each takes 4 bytes of memory once it is known."""
 
 MOST_REPORTS = 4_000_000
-"""Reports of agents for which there is room, where `REPORTS_EACH` for each agent are not more."""
+"""Capacity for reports of agents, unless `REPORTS_EACH` per agent is more."""
 
 REPORTS_EACH = 400
 
 LEAST_COLUMNS, COLUMNS = 40, 8
-"""What is known stands in rows of a multiple of so many columns, as processors compare several at once."""
+"""Minimum number of columns of knowledge arrays, and the number of which it is a multiple, for vectorisation."""
 
 EMPTY = ("reports", "renumbered", "known_", "sent_", "sender", "links")
-"""How the names of arrays begin that are empty at hour 0: they take up memory only where they are filled."""
+"""Prefixes of the names of arrays that are empty at hour 0, so that pages are allocated only when written."""
 
 
 def pack(mission: Mission, knowledge: Knowledge | str | None = None, memory: float = math.inf) -> MissionArrays:
-    """Return a mission at hour 0 for compiled code; `begun` makes it ready for a run.
+    """Return a mission at hour 0 for compiled code; `begun` prepares it for a run.
 
     Parameters
     ----------
     mission : Mission
     knowledge : {"full", "local"}, optional
-        That of the mission by default.
+        By default that of the mission.
     memory : float
-        Hours after which the policy uses nothing that was heard of other agents; it is forgotten then, but for the
-        bytes of messages.
+        Hours after which the policy no longer uses reports of other agents. They are forgotten then, but still count in
+        the bytes of messages.
 
     Raises
     ------
     RefusedError
-        If its distances are geographic or given by a table, or it is too large.
+        If distances are geographic or given by a table, or the mission is too large.
     """
     instance = mission.instance
     if instance.metric == GEOGRAPHIC or instance.distances is not None:
-        raise RefusedError("the compiled simulation has neither geographic distances nor tables of distances")
+        raise RefusedError("the compiled simulation supports neither geographic distances nor distance tables")
     known = mission.knowledge if knowledge is None else Knowledge(knowledge)
     n, m = instance.n, instance.m
     rows, slots = (n, _on_the_air(mission.radio)) if known is Knowledge.LOCAL else (1, 0)
@@ -107,7 +107,7 @@ def pack(mission: Mission, knowledge: Knowledge | str | None = None, memory: flo
 
 
 def _knowledge(n: int, m: int, rows: int, slots: int, words: int) -> dict[str, FloatArray]:
-    """Return what agents know, and the messages that are on the air."""
+    """Return the arrays for agents' knowledge and for messages in transit."""
     wide = max(LEAST_COLUMNS, -(-m // COLUMNS) * COLUMNS)
     known: dict[str, NDArray[np.generic]] = {
         "task_hour": np.full((rows, wide), -1.0),
@@ -128,7 +128,7 @@ def _knowledge(n: int, m: int, rows: int, slots: int, words: int) -> dict[str, F
 
 
 def _on_the_air(radio: Radio) -> int:
-    """Return how many messages of an agent are on the air at once at the most."""
+    """Return the largest number of an agent's messages in transit at once."""
     return 1 if radio.delay == 0 else int(radio.delay // radio.period) + 2
 
 
@@ -139,7 +139,7 @@ def begun(packed: MissionArrays, seed: int = 0) -> MissionArrays:
     ----------
     packed : MissionArrays
     seed : int
-        Of the radio's chances, beside that of the mission.
+        Seed of message losses, together with that of the mission.
     """
     parts = {name: _fresh(part) if name.startswith(EMPTY) else part.copy() for name, part in packed._asdict().items()}
     state = MissionArrays(**parts)  # type: ignore[arg-type]
@@ -149,17 +149,17 @@ def begun(packed: MissionArrays, seed: int = 0) -> MissionArrays:
 
 
 def _fresh(part: Records | FloatArray) -> Records | FloatArray:
-    """Return an empty array like another one."""
+    """Return an array of zeros like another one."""
     return _by_attribute(cast(FloatArray, np.zeros(part.shape, part.dtype)))
 
 
 def records(part: object) -> Records:
-    """Return records of `MissionArrays` as the array that they are, with columns by name."""
+    """Return records of `MissionArrays` as a structured array, with columns by name."""
     return cast(Records, part)
 
 
 def _by_attribute(part: Records | FloatArray) -> Records | FloatArray:
-    """Return an array; one of records with its fields as attributes."""
+    """Return an array; if structured, as a record array, with its fields as attributes."""
     return part if part.dtype.names is None else part.view(np.recarray)
 
 
@@ -236,12 +236,12 @@ def _events(mission: Mission) -> Records:
 
 
 def _amount(event: Event) -> float:
-    """Return by how much an agent is recharged, or the work left of a task."""
+    """Return the amount of a recharge, or the new work left of a task."""
     return event.amount or event.workload or 0.0
 
 
 def _agenda(mission: Mission, deadlines: NDArray[np.intp], knowledge: Knowledge, slots: int) -> Records:
-    """Return the agenda at hour 0: all that happens, deadlines, and the first messages."""
+    """Return the agenda at hour 0: events, deadlines, and the first messages."""
     rows = [(event.hour, int(Turn.EVENT), number) for number, event in enumerate(mission.timeline)]
     rows += [(float(mission.deadline[task]), int(Turn.DEADLINE), task) for task in deadlines.tolist()]
     if knowledge is Knowledge.LOCAL:
@@ -265,17 +265,17 @@ def _allowed(mission: Mission) -> BoolArray:
 
 
 def measure(mission: Mission, state: MissionArrays, policy: str, seed: int = 0) -> MissionResult:
-    """Return the measures of a compiled mission that is over; seconds and decisions are not measured.
+    """Return the measures of a finished compiled mission; decisions and their times are not measured.
 
     Parameters
     ----------
     mission : Mission
-        As it was packed.
+        The mission that was packed.
     state : MissionArrays
     policy : str
-        Its name.
+        Name of the policy.
     seed : int
-        Of the run.
+        Seed of the run.
     """
     head = state.head[0]
     simulation = Simulation(mission, Knowledge.LOCAL if head.is_local else Knowledge.FULL, seed, aware=False)

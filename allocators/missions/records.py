@@ -1,4 +1,4 @@
-"""Records of a compiled mission: agents, tasks, what happens, and all that is neither."""
+"""Record types of a compiled mission: agents, tasks, events, agenda entries, reports, and a head for the rest."""
 
 from functools import cache
 
@@ -13,20 +13,20 @@ class Agent:
     order : int
         `STAY`, `TO_TASK` with `order_task`, or `TO_PLACE` with `order_x` and so on.
     flight : int
-        Number of the flight that goes on, 0 for none; `flights` counts them, and `flown` says whether one has ended
-        anywhere but where it began.
+        Number of the flight in progress, 0 for none; `flights` counts flights, and `flown` says whether one has ended
+        at another place than the start.
     task, previous, next : int
-        Where it works, and who came there before and after it.
+        Task where it works, and the agents that arrived there before and after it (a linked list).
     speaks : int
-        Whether it sends the message that it can send now; a policy sets it.
+        Whether it sends its next message; set by a policy.
     decides, changed : int
-        Whether it is to get an order; whether its flight may end at another hour.
+        Whether it has to decide, and whether its arrival has to be rescheduled.
     looked : int
-        Number of the turn in which it looked around.
+        Number of the turn in which it last sensed.
     report, reported, seen : int, int, float
-        The last report of it, the number of looks when it was written, and the hour.
+        Its last report, the value of `Head.looks` when that was written, and the hour.
     known : int
-        Row of what it knows.
+        Row of its knowledge.
     """
 
     ability: float
@@ -75,7 +75,7 @@ class Agent:
 
 
 class Task:
-    """A task: see `TaskFacts` and `TaskState`; `first` and `last` work there, `changed` is as of an agent."""
+    """A task: see `TaskFacts` and `TaskState`; the list of agents that work there has the ends `first` and `last`."""
 
     workload: float
     x: float
@@ -102,7 +102,7 @@ class Task:
 
 
 class Happening:
-    """An event of the mission; agent and task are numbers, `kind` counts through `EventKind`."""
+    """An event of the mission; agent and task are indices, `kind` is an index of `EventKind`."""
 
     hour: float
     kind: int
@@ -117,7 +117,7 @@ class Happening:
 
 
 class Entry:
-    """An entry of the agenda: hour, turn, and what it is about; `count` says in which order they were made."""
+    """An entry of the agenda; `subject` is an index by the kind of turn, `count` the order of insertion."""
 
     hour: float
     turn: int
@@ -127,12 +127,12 @@ class Entry:
 
 
 class Report:
-    """What was true of an agent at an hour; `task` is where it was going or working.
+    """The state of an agent at an hour; `task` is where it was flying or working.
 
     Attributes
     ----------
     arrives : float
-        Hour at which it is at this task if it goes on, ``-inf`` where it works there.
+        Hour of its arrival at this task, ``-inf`` if it works there.
     ability : float
     """
 
@@ -148,42 +148,42 @@ class Report:
 
 
 class Head:
-    """All that is neither an agent's nor a task's: settings of the mission, and counters.
+    """Settings of the mission, and counters of the simulation.
 
     Attributes
     ----------
     span : float
         Diagonal of the area.
     loss_key, burst_key, pace_key : int
-        States of the hash of chances after the seeds.
+        States of the random numbers' hash after the seeds.
     stage : int
-        Where `advance` goes on.
+        Stage at which `advance` resumes.
     turn : int
-        Counts through all hours at which something happens.
+        Number of hours so far at which something happened.
     tick : int
-        Messages that each agent could have sent.
+        Number of messages that each agent could have sent so far.
     looks : int
-        How often somebody looked around, or several did at once.
+        Number of sensing rounds so far.
     lookers, marked : int
-        Agents that are to look around, and to decide.
+        Number of agents that are to sense, and to decide.
     limit : int
-        Reports up to which none is dropped.
+        Number of reports beyond which unknown ones are dropped.
     has_twins : int
-        Whether there are two reports of an agent at one hour.
+        Whether there are two reports of an agent at the same hour.
     memory : float
-        Hours after which policies use nothing that was heard of others; it may be forgotten then.
+        Hours after which policies no longer use reports of other agents, which may then be forgotten.
     oldest : int
-        The first report that is not as old.
+        The first report that is not older than that.
     left, low, side : float
-        Where the grid of cells begins, and how wide cells are.
+        Corner of the grid, and the side of its cells.
     columns, rows : int
-        Cells of the grid.
+        Size of the grid in cells.
     fastest : float
         Highest speed of an agent.
     located : float
-        Hour for which the grid says where agents are.
+        Hour of the agents' places in the grid.
     unfinished, failed : int
-        Tasks that are open or to come, agents that have failed.
+        Number of tasks that are open or to come, and of agents that have failed.
     """
 
     end: float
@@ -241,5 +241,5 @@ class Head:
 
 @cache
 def record_type(kind: type) -> np.dtype[np.void]:
-    """Return the type of records with the fields of a class."""
+    """Return the structured type with the fields of a class."""
     return np.dtype([(name, np.float64 if hint is float else np.int64) for name, hint in kind.__annotations__.items()])

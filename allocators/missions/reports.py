@@ -1,8 +1,7 @@
-"""Reports of agents, and who knows which, compiled.
+"""Reports of agents, and which agents know them, compiled.
 
-Reports are numbered in the order of time. An agent knows the newest one that it saw or heard of each other agent: its
-row has the number of that, and `NOTHING` of those of whom it knows none. So what is newer of two rows is the larger
-number of each column, and processors compare many at once.
+Reports are numbered chronologically. An agent's row has the number of its newest report of each agent, or `NOTHING`. So
+the newer entries of two rows are given by their elementwise maximum, which is vectorised.
 """
 
 import numpy as np
@@ -18,15 +17,15 @@ _FOURS, _BYTES = np.uint64(0x0F0F0F0F0F0F0F0F), np.uint64(0x0101010101010101)
 _1, _2, _4, _56 = np.uint64(1), np.uint64(2), np.uint64(4), np.uint64(56)
 
 NOTHING = 0
-"""The report where nothing is known of an agent."""
+"""Number that stands for no report of an agent."""
 
 SLACK = 1e-6
-"""Part of the memory by which knowledge is kept longer, as hours are rounded."""
+"""Share of the memory by which reports are kept longer, to allow for rounding errors."""
 
 
 @compiled_in_place
 def report_now(state: MissionArrays, agent: Agent) -> None:
-    """Write another report of an agent, for those who look around now."""
+    """Write a new report of an agent, for agents that sense now."""
     head = state.head[0]
     if agent.seen == head.hour:
         head.has_twins = 1
@@ -54,7 +53,7 @@ def write_report(state: MissionArrays, agent: Agent, report: Report) -> None:
 
 @inlined
 def learn(state: MissionArrays, row: int, agent: int, report: int) -> None:
-    """Let the last report of an agent that is known in a row be another one."""
+    """Replace the last known report of an agent in a row."""
     if state.known_report[row, agent] == NOTHING:
         state.known[row] += 1
         if state.heard_of.shape[1]:
@@ -64,7 +63,7 @@ def learn(state: MissionArrays, row: int, agent: int, report: int) -> None:
 
 @compiled_in_place
 def hear_of_agents(state: MissionArrays, slot: int, number: int) -> None:
-    """Let an agent take over what is newer in the messages that it hears than what it knows of agents."""
+    """Let an agent adopt newer reports of agents from the messages that it receives."""
     head, known, first = state.head[0], state.known_report[number], state.first_sender[slot, number]
     for place in range(first, first + state.senders[slot, number]):
         sender = state.sender[slot, place]
@@ -88,14 +87,14 @@ def is_newer(state: MissionArrays, told: int, known: int) -> bool:
 
 @compiled_in_place
 def take_newer(told: Numbers, known: Numbers) -> None:
-    """Take over the reports that are newer than those known of the same agents: the ones of higher numbers."""
+    """Adopt newer reports of the same agents, i.e. those with higher numbers."""
     for agent in range(len(known)):
         known[agent] = max(known[agent], told[agent])
 
 
 @compiled_in_place
 def keep_recent(known: Numbers, oldest: int, kept: Numbers) -> int:
-    """Copy a row but for old reports; return how many are left."""
+    """Copy a row without old reports; return the number of reports left."""
     count = 0
     for agent in range(len(kept)):
         report = known[agent] if known[agent] >= oldest else NOTHING
@@ -106,7 +105,7 @@ def keep_recent(known: Numbers, oldest: int, kept: Numbers) -> int:
 
 @compiled_in_place
 def find_oldest(state: MissionArrays) -> None:
-    """Find the first report that is recent enough to count."""
+    """Find the first report that is recent enough to be kept."""
     head = state.head[0]
     since = head.hour - head.memory * (1 + SLACK)
     while head.oldest < head.reports and state.reports[head.oldest].hour < since:
@@ -115,7 +114,7 @@ def find_oldest(state: MissionArrays) -> None:
 
 @compiled_in_place
 def drop_unknown(state: MissionArrays) -> None:
-    """Make room where no more reports can be kept: drop those that nobody knows any more."""
+    """Make room for reports by dropping those that no agent knows any more."""
     head, number = state.head[0], state.renumbered
     find_oldest(state)
     number[: head.reports] = NOBODY
@@ -141,7 +140,7 @@ def drop_unknown(state: MissionArrays) -> None:
 
 @inlined
 def mark(known: Numbers, oldest: int, number: Numbers) -> int:
-    """Mark the reports of a row that are to be kept, and drop old ones; return how many are left."""
+    """Mark the reports of a row for keeping, and drop old ones; return the number of reports left."""
     kept = keep_recent(known, oldest, known)
     for agent in range(len(known)):
         number[known[agent]] = 0
@@ -150,7 +149,7 @@ def mark(known: Numbers, oldest: int, number: Numbers) -> int:
 
 @compiled_in_place
 def keep_marked(state: MissionArrays) -> int:
-    """Give new numbers to all reports that are marked; return how many there are."""
+    """Renumber all marked reports; return their number."""
     number, kept = state.renumbered, 0
     for place in range(state.head[0].reports):
         if number[place] != NOBODY:
@@ -178,7 +177,7 @@ def renumber(known: Numbers, number: Numbers) -> None:
 
 @compiled_in_place
 def count_known(known: int, heard_of: IntArray) -> int:
-    """Return of how many agents anything was ever known: those that are, or those of whom bits say so."""
+    """Return of how many agents anything was ever known: by the bits of `heard_of` if these are kept."""
     if len(heard_of) == 0:
         return known
     count = np.uint64(0)
