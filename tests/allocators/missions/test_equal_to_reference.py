@@ -1,4 +1,4 @@
-"""The compiled simulation against the reference, event by event."""
+"""The compiled simulation agrees with the reference, event by event."""
 
 import dataclasses
 import math
@@ -32,7 +32,7 @@ AGENT_STATUS = tuple(AgentStatus)
 
 
 def random_events(rng: random.Random, n: int, m: int) -> list[Event]:
-    """Return events of all kinds, in an order in which they can happen."""
+    """Return events of all kinds in a feasible order."""
     events = []
     for agent in map("a{}".format, range(1, n + 1)):
         if rng.random() < 0.3:
@@ -59,7 +59,7 @@ def random_events(rng: random.Random, n: int, m: int) -> list[Event]:
 
 
 def random_radio(rng: random.Random) -> Radio:
-    """Return any radio."""
+    """Return a random radio."""
     burst = Burst(rng.uniform(0.1, 2), rng.uniform(0.1, 2), rng.uniform(0, 0.3), rng.uniform(0.5, 1))
     return Radio(
         radius=rng.choice([0.3, 0.6, math.inf, 0.0]),
@@ -71,7 +71,7 @@ def random_radio(rng: random.Random) -> Radio:
 
 
 def random_mission(seed: int) -> Mission:
-    """Return a small mission of any kind that the compiled simulation has."""
+    """Return a small random mission with all features that the compiled simulation supports."""
     rng = random.Random(seed)
     n, m = rng.randint(1, 5), rng.randint(1, 6)
     joins = [rng.choice([0.0, 0.0, rng.uniform(0, 0.4)]) for _ in range(n)]
@@ -142,7 +142,7 @@ def require_same_knowledge(view: View, state: MissionArrays, row: int, mission: 
 
 
 def random_order(rng: random.Random, mission: Mission) -> tuple[Order, int, int, tuple[float, float, float]]:
-    """Return any order, for both simulations, also one that cannot be followed."""
+    """Return a random order for both simulations, feasible or not."""
     kind = rng.choice([STAY, TO_TASK, TO_TASK, TO_TASK, TO_PLACE])
     task = rng.randrange(mission.instance.m)
     place = rng.choice([(0.1, 0.2, 0.0), (rng.random(), rng.random(), 0.0)])
@@ -153,7 +153,7 @@ def random_order(rng: random.Random, mission: Mission) -> tuple[Order, int, int,
 def run_both(mission: Mission, seed: int, patience: float) -> tuple[MissionResult, MissionResult]:
     """Run a mission in both simulations with the same random orders, and return both results.
 
-    At every request all that is known is compared, and what becomes of each order.
+    At every request, the knowledge of all agents and the outcome of every order are compared.
     """
     reference, state = Simulation(mission, seed=seed), begun(pack(mission), seed)
     rng, head = random.Random(seed), state.head[0]
@@ -197,11 +197,11 @@ def require_equal(reference: MissionResult, compiled: MissionResult) -> None:
 
 @pytest.mark.parametrize("seed", range(60))
 def test_both_simulations_are_the_same(seed: int) -> None:
-    """On any small mission agents know the same at the same hours, can follow the same orders, and reach the same."""
+    """On small random missions, knowledge, accepted orders and results agree at all hours."""
     require_equal(*run_both(random_mission(seed), seed, random.Random(seed).choice([0.5, 0.9, 0.98])))
 
 
-def test_what_lies_at_the_radius_is_seen_in_both() -> None:
-    """An agent that stops as far from a task as it sees, but for a rounding, sees it in both simulations."""
+def test_tasks_exactly_at_the_sensing_radius_are_seen_in_both() -> None:
+    """An agent at the sensing radius from a task, up to rounding errors, sees it in both simulations."""
     drawn = generated(MissionParameters("steady", 3, 6, loss=0.0), 131)
     require_equal(*run_both(drawn, 131, random.Random(131).choice([0.5, 0.9, 0.98])))

@@ -1,4 +1,4 @@
-"""Policies that are no networks in compiled loops, against the reference, and their tuning."""
+"""Compiled policies other than networks agree with the reference; their tuning can be resumed."""
 
 import dataclasses
 import math
@@ -22,7 +22,7 @@ KEPT = ("joins", "appears", "deadline", "growth", "events", "horizon", "knowledg
 
 
 def missions() -> list[Mission]:
-    """Return small missions with all that the loops have to know: events, deadlines, growth, bursts and delays."""
+    """Return small missions with all features: events, deadlines, growth, bursts and delays."""
     kinds = ("steady", "failures", "recharging", "growth", "deadlines", "silence")
     drawn = [random_mission(MissionParameters(kind, 7, 10), seed) for seed, kind in enumerate(kinds)]
     radios = [RADIOS[number % len(RADIOS)] or mission.radio for number, mission in enumerate(drawn)]
@@ -76,7 +76,7 @@ def drawn_mission(seed: int) -> Mission:
 
 
 def test_drawn_missions_have_all_measures_of_the_reference(request: pytest.FixtureRequest) -> None:
-    """In small missions of all families and radios all measures agree, but for the times of decisions."""
+    """In small missions of all families and radios, all measures agree except decision times."""
     for seed in range(request.config.getoption("--draws") or 40):
         mission, policy = drawn_mission(seed), load_policy(LOOPS[seed // len(FAMILIES) % len(LOOPS)])
         expected = dataclasses.asdict(simulate(mission, policy, seed=seed).result)
@@ -87,8 +87,8 @@ def test_drawn_missions_have_all_measures_of_the_reference(request: pytest.Fixtu
                 assert found[name] == same, (seed, policy.info.name, name)
 
 
-def test_a_grid_finds_who_is_near() -> None:
-    """Among more than a hundred agents those near by are found in a grid of cells: both simulations agree."""
+def test_a_grid_finds_nearby_agents() -> None:
+    """With more than a hundred agents, nearby ones are found by a grid of cells, and both simulations agree."""
     drawn = random_mission(MissionParameters("failures", 150, 20, radius=0.12, sensing=0.12), 5)
     kept = {name: getattr(drawn, name) for name in KEPT if name != "horizon"}
     mission = Mission(drawn.instance, **kept, horizon=0.6, radio=drawn.radio)
@@ -100,14 +100,14 @@ def test_a_grid_finds_who_is_near() -> None:
     assert found.energy == pytest.approx(expected.energy, rel=1e-9)
 
 
-def test_policies_without_loops_are_refused() -> None:
-    """What leads all agents is an error, not a wrong figure."""
+def test_policies_without_a_compiled_version_are_refused() -> None:
+    """A central policy is an error, not a wrong result."""
     with pytest.raises(InputError, match="no compiled version"):
         run_compiled(missions()[0], load_policy("idle"))
 
 
-def test_a_tuning_goes_on_where_it_was_interrupted(tmp_path: Path) -> None:
-    """Two generations in two goes are those of one go."""
+def test_an_interrupted_tuning_is_resumed(tmp_path: Path) -> None:
+    """Two generations in two runs are the same as in one run."""
     small = MissionTrainingParameters(missions=1, candidates=4, validations=1)
     whole = list(tune("auction", 2, 3, setting=small))
     state = tmp_path / "state.npz"

@@ -1,4 +1,4 @@
-"""Every policy passes the conformance suite, and the suite catches the defects for which it is there."""
+"""Every policy passes the conformance suite, and the suite detects the defects that it is meant to detect."""
 
 import sys
 import time
@@ -72,7 +72,7 @@ class TestClairvoyant(PolicyConformance):
 
 
 class Defective(Policy):
-    """The nearest task, but for what `decider` does."""
+    """Takes the nearest task, with a defect added by `decider`."""
 
     info = PolicyInfo(name="defective", summary="does what it must not")
     decider: type[AgentDecider]
@@ -90,7 +90,7 @@ class Decider(AgentDecider):
 
 
 class LooksBehindTheScenes(Decider):
-    """Finds the simulation among its callers, and chooses by all work there is and will be."""
+    """Finds the simulation on the call stack, and decides by present and future work."""
 
     def decide(self, view):
         frame = sys._getframe()
@@ -102,7 +102,7 @@ class LooksBehindTheScenes(Decider):
 
 
 class GoesToTheUnknown(Decider):
-    """Goes to a task that it was not told of."""
+    """Goes to a task that it does not know."""
 
     def decide(self, view):
         return Order("t5")
@@ -121,7 +121,7 @@ class FliesWithoutBattery(Decider):
 
 
 class TalksInSecret(Decider):
-    """Tells the others its task by way of the policy that all of them share."""
+    """Shares its task with other agents through the common policy object."""
 
     def decide(self, view):
         taken = self.policy.__dict__.setdefault("taken", set())
@@ -133,7 +133,7 @@ class TalksInSecret(Decider):
 
 
 class ThrowsDice(Decider):
-    """Has a source of random numbers that no seed reaches."""
+    """Uses an unseeded random generator."""
 
     def decide(self, view):
         tasks = view.open_tasks(view.own)
@@ -154,7 +154,7 @@ class ThrowsDice(Decider):
     ],
 )
 def test_defects_are_caught(kind, check, arguments):
-    """A policy that breaks the contract fails the test of what it breaks."""
+    """A policy that violates the contract fails the corresponding test."""
 
     class Broken(Defective):
         decider = kind
@@ -170,7 +170,7 @@ def test_defects_are_caught(kind, check, arguments):
 
 
 def test_every_policy_is_tested():
-    """Each built-in policy has a class above, and completion knows it."""
+    """Each built-in policy has a test class above, and is known to shell completion."""
     tested = {kind.name for kind in PolicyConformance.__subclasses__() if kind.name}
     assert set(BUILT_IN_POLICIES) == tested
     assert list(BUILT_IN_POLICIES) == policy_names()[: len(BUILT_IN_POLICIES)]

@@ -1,4 +1,4 @@
-"""What is handed to a policy holds nothing that it may not know, however deep one looks."""
+"""Objects passed to a policy contain nothing that it must not know, at any depth."""
 
 from types import MappingProxyType
 
@@ -12,7 +12,7 @@ from alloc.problems.vocabulary import Knowledge
 
 
 def everything_in(found, *values):
-    """Gather all texts, numbers and positions in some values, through containers and attributes, private ones too."""
+    """Collect all strings, numbers and positions in some values, through containers and private attributes."""
     seen, left = set(), list(values)
     while left:
         value = left.pop()
@@ -32,7 +32,7 @@ def everything_in(found, *values):
 
 
 class Searching(Policy):
-    """The nearest task; looks through all that it is handed for what it may not know."""
+    """Takes the nearest task; searches everything that it is passed for what it must not know."""
 
     info = PolicyInfo(name="searching", summary="looks for leaks")
 
@@ -61,7 +61,7 @@ class Searching(Policy):
 
 @pytest.mark.parametrize("knowledge", Knowledge)
 def test_nothing_leaks(knowledge):
-    """No id, place or work of a task that is not known, and no hour of a failure to come, is in view or briefing."""
+    """Views and briefings contain no id, place or workload of an unknown task, and no hour of a future failure."""
     drawn = random_mission(MissionParameters(family="failures", agents=5, tasks=8, sensing=0.25), 1)
     mission = Mission(
         drawn.instance,

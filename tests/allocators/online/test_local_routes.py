@@ -1,4 +1,4 @@
-"""Routes by local knowledge: what agents agree on by messages, and where they look around."""
+"""Routes with local knowledge: agreement through messages, and exploration."""
 
 import numpy as np
 import pytest
@@ -39,8 +39,8 @@ def drawn(sensing=0.3, **more):
     return Mission(instance, knowledge="local", sensing=sensing, radio=radio, horizon=40.0, seed=1)
 
 
-def test_notes_tell_all_routes():
-    """Who hears the notes of another knows what it knows, whatever it knew before."""
+def test_notes_carry_all_routes():
+    """An agent that receives notes knows all routes of their sender, whatever it knew before."""
     one, other = announced(a1=EARLY, a2=LATE), announced(a1=Route(0.5, "a1", (("t9", 1.0),)))
     other.hear(one.notes())
     assert other.routes == one.routes
@@ -48,15 +48,15 @@ def test_notes_tell_all_routes():
 
 @pytest.mark.parametrize("order", [(EARLY, LATE), (LATE, EARLY)])
 def test_the_newer_route_counts(order):
-    """It does not matter in which order two routes of an agent are heard."""
+    """The order in which two routes of an agent are received does not matter."""
     known = announced()
     for route in order:
         known.plan("a3", route)
     assert known.routes == {"a3": LATE}
 
 
-def test_of_two_routes_of_one_hour_that_of_the_first_planner_counts():
-    """All agents settle on the same one of two plans that were made at the same time."""
+def test_at_equal_hours_the_first_planner_counts():
+    """All agents agree on one of two plans made at the same hour."""
     one, other = Route(1.0, "a1", ()), Route(1.0, "a2", (("t1", 2.0),))
     for order in ((one, other), (other, one)):
         known = announced()
@@ -65,15 +65,15 @@ def test_of_two_routes_of_one_hour_that_of_the_first_planner_counts():
         assert known.routes["a3"] == one
 
 
-def test_a_planner_may_change_its_mind_at_once():
-    """Of two routes that it planned in the same hour the last counts."""
+def test_a_planner_may_replace_its_own_route_in_the_same_hour():
+    """Of two routes by one planner in the same hour, the last counts."""
     known = announced(a1=EARLY)
     known.plan("a1", Route(1.0, "a1", (("t3", 2.0),)))
     assert known.routes["a1"].tasks == ["t3"]
 
 
 def test_tasks_are_left_to_others_while_their_routes_last():
-    """A task belongs to the newest route that has it; a route that is long over counts no more."""
+    """A task belongs to the newest route that contains it; a route that ended long ago no longer counts."""
     known = announced(a1=EARLY, a2=LATE)
     assert known.taken({"a3"}, 3.0, 1.0) == {"t1": 3.0, "t2": 4.0}
     assert known.taken({"a2"}, 3.0, 1.0) == {"t1": 3.0}
@@ -82,7 +82,7 @@ def test_tasks_are_left_to_others_while_their_routes_last():
 
 
 def test_a_task_planned_twice_stays_with_the_earliest():
-    """Agents that meet drop what another plan does earlier; a coalition of one plan stays."""
+    """Agents that meet drop tasks that another plan does earlier; a coalition within one plan stays."""
     known = announced(a1=EARLY, a2=LATE)
     assert known.joined(["a1", "a2"]) == {"a1": ["t1"], "a2": ["t2"]}
     together = announced(a1=EARLY, a2=EARLY)
@@ -90,7 +90,7 @@ def test_a_task_planned_twice_stays_with_the_earliest():
 
 
 def looked(mission, others):
-    """Return where the first agent is sent to look around before it has gone anywhere."""
+    """Return where the first agent is sent to explore from its start."""
     simulation = Simulation(mission)
     simulation.advance()
     view = simulation.view("a1")
@@ -99,28 +99,28 @@ def looked(mission, others):
     return lookout.order(view, others)
 
 
-def test_agents_look_around_in_parts_of_the_area():
-    """An agent looks at places that it has not wholly seen and to which no other one is nearer."""
+def test_agents_explore_their_parts_of_the_area():
+    """An agent explores cells that it has not fully seen and that no other agent is closer to."""
     for other in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)):
         goal = looked(drawn(), [Place(other)]).position
         assert np.linalg.norm(goal) > 0.25
         assert np.linalg.norm(goal) <= np.linalg.norm(np.subtract(goal, other)) + 1e-9
 
 
-def test_a_place_is_seen_when_all_of_it_is():
-    """A corner of the area, at 1.41, is looked at although the middle of its cell, at 1.38, was seen from (0.1, 0)."""
+def test_a_cell_counts_as_seen_only_as_a_whole():
+    """A corner of the area, at 1.41, is explored although the centre of its cell, at 1.38, was seen from (0.1, 0)."""
     goal = looked(drawn(sensing=1.33), []).position
     assert np.linalg.norm(goal) > 1.28
 
 
-def test_who_sees_everything_stays():
+def test_agents_that_see_everything_do_not_explore():
     """There is nothing to look for."""
     assert looked(drawn(sensing=np.inf), []) == STAY
 
 
 @pytest.mark.parametrize(("radius", "reached"), [(0.05, ["a1"]), (0.3, ["a1", "a2"]), (1.4, ["a1", "a2", "a3"])])
-def test_who_is_seen_beyond_the_radio_is_not_in_contact(radius, reached):
-    """All see each other; a3 hears the first agent by the second one alone, at 1.35 from it."""
+def test_agents_seen_beyond_radio_range_are_not_in_contact(radius, reached):
+    """All agents see each other; a3 hears the first agent only through the second one, at 1.35 from it."""
     simulation = Simulation(drawn(sensing=5.0))
     simulation.advance()
     view = simulation.view("a1")
@@ -128,8 +128,8 @@ def test_who_is_seen_beyond_the_radio_is_not_in_contact(radius, reached):
     assert in_contact(view, radius, view.hour) == reached
 
 
-def test_reports_from_before_do_not_count():
-    """Who was not heard of for too long is no longer in contact."""
+def test_old_reports_do_not_count_as_contact():
+    """An agent that was not heard of for too long is no longer in contact."""
     simulation = Simulation(drawn(sensing=5.0))
     simulation.advance()
     view = simulation.view("a1")
@@ -138,8 +138,8 @@ def test_reports_from_before_do_not_count():
 
 @pytest.mark.slow
 @pytest.mark.timeout(300)
-def test_who_can_take_no_task_of_its_route_gives_them_back():
-    """A plan that others made may ask for more than an agent's battery has by now."""
+def test_an_agent_gives_up_a_route_beyond_its_battery():
+    """A route planned by others may need more energy than the agent has by now."""
     mission = drawn(energy_per_distance=1, battery=[1, 1e-3, 1])
     simulation = Simulation(mission)
     simulation.advance()
@@ -158,6 +158,6 @@ def test_who_can_take_no_task_of_its_route_gives_them_back():
 @pytest.mark.timeout(300)
 @pytest.mark.parametrize("metric", ["euclidean", "manhattan"])
 def test_agents_out_of_contact_do_all_tasks(metric):
-    """Two agents that hear of each other, and one far away, find and do tasks that nobody sees at first."""
+    """Two agents in contact and one far away find and do tasks that none of them sees at first."""
     result = simulate(drawn(metric=metric), "local-routes", iterations=20, first_iterations=20).result
     assert result.status == "done"

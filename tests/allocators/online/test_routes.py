@@ -1,4 +1,4 @@
-"""Plans of routes: the schedule is what the simulation makes of a plan, and the search finds the best of tiny ones."""
+"""Route plans: schedules agree with the simulation, and the search finds optimal plans of tiny missions."""
 
 from itertools import permutations, product
 
@@ -47,8 +47,8 @@ def worth(known, plan):
 
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("family", FAMILIES)
-def test_the_schedule_is_what_comes_of_the_plan(family, seed):
-    """A plan that is made knowing all, and kept, ends each task at the hour that its schedule says."""
+def test_the_schedule_agrees_with_the_simulation(family, seed):
+    """A plan made with full foresight and followed completes each task at the hour in its schedule."""
     mission = drawn(family, seed)
     policy = load_policy("clairvoyant", iterations=0, first_iterations=30)
     decider = policy.begin(Briefing.of(mission, Knowledge.FULL, 0, None, None, clairvoyant=True))
@@ -73,7 +73,7 @@ def test_the_schedule_is_what_comes_of_the_plan(family, seed):
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("family", [*FAMILIES, "cfstp"])
 def test_the_search_finds_the_best_plan(family, seed):
-    """With two agents and three tasks no plan of all there are is better than that found."""
+    """With two agents and three tasks, no plan is better than the one found."""
     known = described(drawn(family, seed, agents=2, tasks=3))
     count = len(known.tasks)
     every = [route for size in range(count + 1) for route in permutations(range(count), size)]
@@ -84,8 +84,8 @@ def test_the_search_finds_the_best_plan(family, seed):
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-def test_changed_plans_are_scheduled_as_whole_ones(family):
-    """Whoever is not concerned by a change keeps the schedule that the whole plan would give anew."""
+def test_incremental_schedules_equal_full_ones(family):
+    """Agents not affected by a change keep the schedule that scheduling the whole plan would give."""
     mission = drawn(family, 0, agents=5, tasks=12)
     policy = load_policy("clairvoyant")
     decider = policy.begin(Briefing.of(mission, Knowledge.FULL, 0, None, None, clairvoyant=True))
@@ -113,8 +113,8 @@ def test_changed_plans_are_scheduled_as_whole_ones(family):
             np.testing.assert_allclose(kept.totals, whole.totals, rtol=1e-12)
 
 
-def test_foresight_is_worth_something():
-    """Who knows all that comes needs no more time than who does not, over some missions, and none beats the bound."""
+def test_foresight_saves_time():
+    """Over some missions, `clairvoyant` needs no more time than `routes`, and neither beats the lower bound."""
     total = {"routes": 0.0, "clairvoyant": 0.0}
     for seed in range(4):
         mission = drawn(MissionFamily.FAILURES, seed, tasks=6)

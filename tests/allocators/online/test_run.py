@@ -1,4 +1,4 @@
-"""Runs of policies: deadlines, answers that are none, plugins, parameters; and what the policies are for."""
+"""Runs of policies: deadlines, invalid orders, plugins, parameters; and differences between policies."""
 
 import time
 
@@ -28,7 +28,7 @@ TWO = Mission(Instance(ability=[1, 1], workload=[2, 2], **PLACES))
 
 
 class Answers(Policy):
-    """A policy whose every agent answers what `answer` says."""
+    """A policy in which every agent returns the value of `answer`."""
 
     info = PolicyInfo(name="answers", summary="whatever it is told to")
 
@@ -58,8 +58,8 @@ class Fleet(Answers):
         return Decider()
 
 
-def test_late_answers_are_not_followed():
-    """What comes after the deadline is dropped and counted; the last order stands."""
+def test_late_orders_are_ignored():
+    """Orders after the deadline are dropped and counted; the last order stays in force."""
 
     def slowly(view):
         if view.hour > 0:
@@ -89,7 +89,7 @@ def test_an_answer_that_is_not_an_order_is_an_error(policy, told):
 
 
 def test_orders_that_cannot_be_followed_are_logged():
-    """An order to a task that there is not is refused with the reason, and counted."""
+    """An order to an unknown task is refused with the reason, and counted."""
     run = simulate(TWO, Answers(lambda view: Order("t7") if view.id == "a1" else None))
     assert run.result.orders_refused == 1
     assert [record["reason"] for record in run.log.records if record["record"] == "refused"] == [
@@ -98,7 +98,7 @@ def test_orders_that_cannot_be_followed_are_logged():
 
 
 def test_nothing_is_compiled_within_a_mission():
-    """Loading `gappo` compiles its loops, for the types that missions call them by: the first decision is in time."""
+    """Loading `gappo` compiles its loops for the argument types of missions, so the first decision is in time."""
     from alloc.allocators.learned.missions import play, talking
 
     policy = load_policy("gappo")
@@ -111,13 +111,13 @@ def test_nothing_is_compiled_within_a_mission():
 
 
 def test_central_policies_need_full_knowledge():
-    """Who leads all agents cannot do so by what one of them knows."""
+    """A central policy is refused with local knowledge."""
     with pytest.raises(RefusedError, match="needs full knowledge"):
         simulate(TWO, "replan", knowledge="local", method="greedy")
 
 
 def test_policies_are_found_by_name(monkeypatch):
-    """Built-in ones and those of plugins; a wrong name, a plugin that is none and a wrong parameter are told."""
+    """Built-in policies and plugins are found; a wrong name, an invalid plugin and a wrong parameter are errors."""
 
     class EntryPoint:
         def __init__(self, name, target):
@@ -143,8 +143,8 @@ def test_policies_are_found_by_name(monkeypatch):
             load_policy(name, **settings)
 
 
-def test_replan_keeps_to_its_plan_where_nothing_happens():
-    """On an instance `replan` is no worse than the plan of its method, as agents take other tasks afterwards."""
+def test_replan_keeps_its_plan_without_events():
+    """On an instance, `replan` is no worse than its method's plan, as agents can take further tasks afterwards."""
     rng = np.random.default_rng(1)
     instance = Instance(
         ability=rng.integers(1, 9, 8), workload=rng.uniform(5, 20, 4), agent_position=rng.random((8, 2)),
@@ -156,15 +156,15 @@ def test_replan_keeps_to_its_plan_where_nothing_happens():
 
 
 def test_a_price_on_moves_saves_switches():
-    """With a high price on moves agents stay with their tasks while new ones appear."""
+    """With a high move price, agents stay with their tasks while new ones appear."""
     mission = random_mission(MissionParameters(agents=4, tasks=6, knowledge="full"), 3)
     free = simulate(mission, "replan", method="greedy", iterations=1).result
     dear = simulate(mission, "replan", method="greedy", iterations=1, move_price=1000).result
     assert dear.switches < free.switches
 
 
-def test_knowing_what_others_do_saves_time():
-    """Over a few missions `greedy` is done before `nearest`, on the same knowledge."""
+def test_greedy_is_faster_than_nearest():
+    """Over a few missions, `greedy` finishes earlier than `nearest` with the same knowledge."""
     missions = [random_mission(MissionParameters(agents=6, tasks=10), seed) for seed in range(6)]
 
     def mean(policy):

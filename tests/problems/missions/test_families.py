@@ -29,8 +29,8 @@ def test_every_family_is_seeded(family):
     assert mission_to_document(random_mission(parameters, 2)) | {"name": "", "seed": 1} != first | {"name": ""}
 
 
-def test_families_have_what_they_are_called_by():
-    """Waves are few hours, hot spots near each other; tasks grow or have deadlines; agents fail or recharge."""
+def test_families_have_their_features():
+    """Each family has its feature: waves, hot spots, growth, deadlines, failures, recharging or silences."""
 
     def drawn(family):
         return random_mission(MissionParameters(family=family, agents=20, tasks=60), 3)
@@ -57,15 +57,15 @@ def nearest(places):
     return distance.min(axis=1).mean()
 
 
-def test_the_paper_s_sizes_are_fixed():
-    """Scenarios of the paper have its agents, and refuse others."""
+def test_sizes_of_paper_scenarios_are_fixed():
+    """Scenarios of the paper have its number of agents, and refuse others."""
     assert random_mission(MissionParameters(family="paper-2"), 0).instance.n == 300
     with pytest.raises(InputError, match="agents: is fixed"):
         random_mission(MissionParameters(family="paper-2", agents=3), 0)
 
 
-def test_a_snapshot_has_what_is_there():
-    """At an hour there are the agents that have joined and not failed, and open tasks with what they have grown to."""
+def test_a_snapshot_has_present_agents_and_open_tasks():
+    """A snapshot has the agents that have joined and not failed, and the open tasks with their grown work."""
     instance = Instance(ability=[1, 2, 3], workload=[4, 5, 6], battery=[1, 2, 3])
     mission = Mission(
         instance,
@@ -83,7 +83,7 @@ def test_a_snapshot_has_what_is_there():
 
 
 def test_measures_are_as_defined():
-    """Two tasks of priorities 1 and 3, done after 2 and 4 hours by one agent that flies 2 + 0, and what is left."""
+    """Two tasks of priorities 1 and 3, done after 2 and 4 hours by one agent that flies 2 + 0, have known measures."""
     instance = Instance(
         ability=[1, 1], workload=[1, 2, 5, 9], priority=[1, 3, 2, 2], speed=[1, 1], battery=[8, 4],
         energy_per_distance=2.0, agent_position=[[0, 0], [5, 5]], task_position=[[1, 0], [1, 0], [5, 5], [5, 5]],
@@ -105,8 +105,8 @@ def test_measures_are_as_defined():
     assert result.mission_time_lower_bound == 8.5
 
 
-def test_cfstp_is_as_its_benchmark():
-    """Cells of 50 x 50, deadlines from 5 to 600, workloads from 10 to 50, agents alike; seeded."""
+def test_cfstp_has_the_distribution_of_its_benchmark():
+    """A 50 x 50 grid, deadlines from 5 to 600, workloads from 10 to 50, identical agents; reproducible by seed."""
     mission = random_cfstp(4, 2000, 7)
     instance = mission.instance
     assert (instance.n, instance.m, instance.metric, mission.horizon) == (4, 2000, "manhattan", np.inf)

@@ -1,4 +1,4 @@
-"""All faults of a mission, one by one."""
+"""All faults of a mission's document are reported, one error each."""
 
 import copy
 import json
@@ -38,8 +38,8 @@ def places(document):
     return [fault.place for fault in mission_faults(document)[1]]
 
 
-def test_each_fault_is_told_with_its_place():
-    """Faults in settings, agents, tasks and events are all found, each at its place in the whole document."""
+def test_each_fault_is_reported_with_its_place():
+    """Faults in settings, agents, tasks and events are all found, each at its place in the original document."""
     document = faulty(
         sensing=-1,
         agents__1__abilty=3,
@@ -60,14 +60,14 @@ def test_each_fault_is_told_with_its_place():
     ]
 
 
-def test_what_follows_from_a_fault_is_not_told():
-    """An event that is impossible only without a wrong one before it is no fault of its own."""
+def test_consequences_of_a_fault_are_not_reported():
+    """An event that is impossible only because a faulty one was removed is not reported."""
     assert places(faulty(events__0__agent="a9")) == ["events[0].agent"]
     assert places(faulty(events__1__agent="a2")) == ["events[1]"]
 
 
 def test_the_first_fault_is_that_of_the_reader():
-    """The first line is the one that reading the mission gives."""
+    """The first error is the one that reading the mission raises."""
     for document in (faulty(seed=0.5), faulty(tasks=[]), faulty(format="alloc-mission/2"), [], faulty(pace={"low": 9})):
         with pytest.raises(InputError) as caught:
             mission_from_document(document)
@@ -75,7 +75,7 @@ def test_the_first_fault_is_that_of_the_reader():
 
 
 def test_fields_that_occur_twice():
-    """An object in which a field occurs twice is a fault, and those after it are still found."""
+    """A repeated field in an object is a fault, and later faults are still found."""
     text = (
         json.dumps(GOOD)
         .replace('"id": "a1", ', '"id": "a1", "id": "a1", ')
@@ -85,15 +85,15 @@ def test_fields_that_occur_twice():
 
 
 def test_a_good_mission_is_returned():
-    """Without a fault the mission is the one that the reader gives."""
+    """Without faults, the mission is the one that the reader returns."""
     drawn = mission_to_document(random_mission(MissionParameters(family="failures"), 3))
     mission, faults = mission_faults(drawn)
     assert faults == []
     assert mission_to_document(mission) == drawn
 
 
-def test_faults_come_to_an_end():
-    """Of very many faults the first ones are told, and the document that was given is not changed."""
+def test_the_number_of_faults_is_limited():
+    """Of very many faults only the first ones are reported, and the given document is not modified."""
     document = faulty(events=[{"hour": -1, "event": "agent-fails", "agent": "a1"}] * 50)
     before = copy.deepcopy(document)
     assert len(places(document)) == MOST_FAULTS

@@ -1,4 +1,4 @@
-"""alloc-mission/1 and alloc-mission-log/1: what is read, written, and refused in one line."""
+"""Reading, writing and errors of alloc-mission/1 and alloc-mission-log/1."""
 
 import copy
 import json
@@ -29,7 +29,7 @@ DEMO = {
 
 
 def test_the_example_is_read():
-    """Agents and tasks that come by events are among the others, and everything happens in the order of time."""
+    """Agents and tasks defined in events are among the others, and the timeline is chronological."""
     mission = mission_from_document(DEMO)
     assert mission.instance.agent_ids == ("a1", "a2")
     assert mission.instance.task_ids == ("t1", "t2")
@@ -43,14 +43,14 @@ def test_the_example_is_read():
 @given(missions())
 @settings(max_examples=30, deadline=None)
 def test_missions_survive_writing_and_reading(mission):
-    """What is written is valid by the schema, and read as the same mission."""
+    """A written mission is valid by the schema, and is read as an equal mission."""
     document = json.loads(json.dumps(mission_to_document(mission)))
     assert faults(document) == []
     assert mission_to_document(mission_from_document(document)) == mission_to_document(mission)
 
 
 def test_an_instance_is_a_mission(tmp_path):
-    """A file of an instance, in any format, is a mission in which all is there from the start."""
+    """An instance file in any format is read as a mission with all agents and tasks from the start."""
     from alloc.problems import paper, write_instance
 
     for name in ("i.json", "i.npz", "folder"):
@@ -93,8 +93,8 @@ WRONG = [
 
 
 @pytest.mark.parametrize(("part", "row", "field", "value", "told"), WRONG)
-def test_faults_are_told_in_one_line(part, row, field, value, told):
-    """Each wrong field is named with its place and what is expected."""
+def test_faults_are_one_line_errors(part, row, field, value, told):
+    """The error for a wrong field names its place and the expected value."""
     document = copy.deepcopy(DEMO)
     (document if part is None else document[part][row])[field] = value
     if told == "events[1]: ":
@@ -105,8 +105,8 @@ def test_faults_are_told_in_one_line(part, row, field, value, told):
     assert "\n" not in str(caught.value)
 
 
-def test_events_must_be_possible():
-    """Nobody returns who was not recalled, fails twice, or joins twice."""
+def test_sequences_of_events_must_be_possible():
+    """An agent cannot return without a recall, fail twice, or join twice."""
     for events, told in (
         ([{"hour": 1, "event": "agent-returns", "agent": "a1"}], "needs agent 'a1' to be away"),
         ([{"hour": hour, "event": "agent-fails", "agent": "a1"} for hour in (1, 2)], "but it is failed"),
@@ -117,15 +117,15 @@ def test_events_must_be_possible():
             mission_from_document(DEMO | {"events": events})
 
 
-def test_what_cannot_be_combined_is_refused():
-    """Agents that return do not go with distances of one's own: who is stopped on a given way has no way back."""
+def test_returns_with_own_distances_is_refused():
+    """Agents that return are refused with own distances: an agent stopped on the way has no distance home."""
     document = DEMO | {"distances": {"rows": [["a1", "t1", 2]]}, "agents": [DEMO["agents"][0] | {"returns": True}]}
     with pytest.raises(InputError, match=r"agents\[0\]\.returns: cannot be combined"):
         mission_from_document(document)
 
 
 def logged(seed):
-    """Return the log of a mission of any kind under wild orders."""
+    """Return the log of a random mission under random orders."""
     import numpy as np
 
     simulation = run_wildly(random_mission_of_any_kind(np.random.default_rng(seed)), seed)
@@ -134,7 +134,7 @@ def logged(seed):
 
 @pytest.mark.parametrize("seed", range(6))
 def test_a_log_is_replayed_byte_for_byte(seed, tmp_path):
-    """From the file alone the same lines and the same figures come again, and the laws hold."""
+    """The file alone reproduces the same lines and the same figures, and the conservation laws hold."""
     log = logged(seed)
     write_log(log, tmp_path / "log.jsonl")
     read = read_log(tmp_path / "log.jsonl")
@@ -146,8 +146,8 @@ def test_a_log_is_replayed_byte_for_byte(seed, tmp_path):
     assert laws.battery_lost == pytest.approx(laws.battery_energy, rel=1e-9, abs=1e-9)
 
 
-def test_a_log_that_was_changed_is_told_with_its_line(tmp_path):
-    """Another hour, another order, a line too few and another figure are each an error."""
+def test_a_changed_log_is_an_error_at_its_line(tmp_path):
+    """A changed hour, a changed order, a missing line and a changed figure are each an error."""
     lines = logged(2).to_text().splitlines()
     order = next(number for number, line in enumerate(lines) if '"record": "arrival"' in line)
     broken = {
@@ -164,8 +164,8 @@ def test_a_log_that_was_changed_is_told_with_its_line(tmp_path):
         assert name
 
 
-def test_missions_are_written_as_json_alone(tmp_path):
-    """A name that says another format is refused."""
+def test_missions_are_written_only_as_json(tmp_path):
+    """A file name with another suffix is refused."""
     with pytest.raises(InputError, match=r"use \.json"):
         write_mission(mission_from_document(DEMO), tmp_path / "mission.csv")
     write_mission(mission_from_document(DEMO), tmp_path / "mission.json")

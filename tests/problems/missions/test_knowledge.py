@@ -1,4 +1,4 @@
-"""Who knows what: sensing, radio, losses, delay, silence."""
+"""Agents' knowledge: sensing, radio, losses, delay, silence."""
 
 import numpy as np
 import pytest
@@ -20,7 +20,7 @@ LINE = Instance(
 
 
 def told(mission, until, seed=0, speakers=None):
-    """Let everybody tell all up to an hour; return the simulation when orders are due then."""
+    """Let all agents send all messages up to an hour; return the simulation at its request for orders then."""
     simulation = Simulation(mission, seed=seed)
     while (request := simulation.advance()) is not None:
         if request.wanted is Wanted.ORDERS and request.hour >= until:
@@ -41,7 +41,7 @@ def known(simulation, agent):
 
 
 def test_agents_know_what_they_sense():
-    """Without radio each agent knows itself and what lies within its sensing radius, as it was when it looked."""
+    """Without radio, an agent knows itself and what was within its sensing radius when it sensed."""
     simulation = told(mission(Radio(radius=0.2)), 0.5)
     assert [known(simulation, name) for name in ("a1", "a2", "a3")] == [{"t1"}, set(), set()]
     assert set(simulation.view("a1").agents) == {"a1"}
@@ -50,7 +50,7 @@ def test_agents_know_what_they_sense():
 
 
 def test_news_travels_by_one_radius_a_period():
-    """What the first agent sees the second hears at once, the third a period later, with the hour when it was true."""
+    """What one agent sees, the second hears at once and the third a period later, with the hour of observation."""
     radio = Radio(radius=1.0, period=0.5)
     first, later = told(mission(radio), 0.0), told(mission(radio), 0.5)
     assert [known(first, name) for name in ("a1", "a2", "a3")] == [{"t1"}, {"t1"}, set()]
@@ -60,14 +60,14 @@ def test_news_travels_by_one_radius_a_period():
 
 
 def test_messages_take_their_delay():
-    """With a delay of 0.7 h nothing is known by radio before."""
+    """With a delay of 0.7 h, nothing is known by radio before."""
     radio = Radio(radius=1.0, period=0.5, delay=0.7)
     assert known(told(mission(radio), 0.5), "a2") == set()
     assert known(told(mission(radio), 1.0), "a2") == {"t1"}
 
 
-def test_the_silent_neither_send_nor_hear():
-    """While an agent, or the region where it is, is silent, nobody hears it and it hears nobody."""
+def test_silent_agents_neither_send_nor_receive():
+    """While an agent or its region is silent, it neither receives messages nor is it heard."""
     radio = Radio(radius=1.0, period=0.5)
     for where in ({"agent": "a1"}, {"agent": "a2"}, {"center": (1, 0), "radius": 0.5}):
         events = [Event(0, "radio-silent", until=1.2, **where)]
@@ -76,8 +76,8 @@ def test_the_silent_neither_send_nor_hear():
         assert known(after, "a2") == {"t1"}
 
 
-def test_lost_messages_are_as_many_as_said():
-    """A share of 0.3 of many messages is lost, and all policies and speakers meet the same losses."""
+def test_the_loss_rate_is_as_specified():
+    """Of many messages, 30 % are lost, and losses do not depend on which other agents send."""
     radio = Radio(period=0.01, loss=0.3)
     all_speak = told(Mission(LINE, knowledge="local", sensing=0, radio=radio, horizon=9), 8.0)
     heard = [record for record in all_speak.log.records if record["record"] == "message"]
@@ -88,7 +88,7 @@ def test_lost_messages_are_as_many_as_said():
 
 
 def test_bursts_have_their_lengths_and_losses():
-    """Losses come in runs: after a lost message another is lost far more often than on average."""
+    """Losses are correlated: after a lost message, the next is lost far more often than on average."""
     radio = Radio(period=0.05, burst=Burst(good=2.0, bad=1.0, loss_good=0.0, loss_bad=1.0))
     simulation = told(Mission(LINE, knowledge="local", sensing=0, radio=radio, horizon=120), 110.0, speakers=["a1"])
     lost = np.array(["a2" not in record["heard"] for record in simulation.log.records if record["record"] == "message"])
@@ -97,7 +97,7 @@ def test_bursts_have_their_lengths_and_losses():
 
 
 def test_full_knowledge_is_of_the_present():
-    """With full knowledge all know what has appeared and who has joined, and nothing that is to come."""
+    """With full knowledge, agents know all tasks that have appeared and agents that have joined, but not the future."""
     simulation = Simulation(Mission(LINE, joins=[0, 0, 5], appears=[0, 3]))
     simulation.advance()
     assert set(simulation.view(None).tasks) == {"t1"}
@@ -106,8 +106,8 @@ def test_full_knowledge_is_of_the_present():
     assert set(simulation.view(None).tasks) == {"t1", "t2"}
 
 
-def test_orders_under_local_knowledge_are_for_what_is_known():
-    """A task that an agent was not told of it cannot be sent to; to one that is over it flies if it cannot know."""
+def test_orders_under_local_knowledge_need_known_tasks():
+    """An agent refuses unknown tasks; it flies to a closed one if it cannot know that it is closed."""
     simulation = told(mission(Radio(radius=1.0, period=0.5), events=[Event(0.7, "task-cancelled", task="t1")]), 0.5)
     assert simulation.order("a2", Order("t2")) == "the agent does not know the task"
     assert simulation.order("a2", Order("t1")) is None
@@ -117,8 +117,8 @@ def test_orders_under_local_knowledge_are_for_what_is_known():
     assert (report.status, simulation.view("a2").own.task) == (TaskStatus.CANCELLED, None)
 
 
-def test_chances_are_even():
-    """Numbers for keys that follow each other are spread evenly, and differ by each part of the key."""
+def test_keyed_random_numbers_are_uniform():
+    """Numbers of consecutive keys are uniform, and depend on each part of the key."""
     drawn = np.array([uniform(1, 2, key) for key in range(2000)])
     assert np.histogram(drawn, bins=10, range=(0, 1))[0].min() > 150
     assert abs(np.corrcoef(drawn[1:], drawn[:-1])[0, 1]) < 0.1

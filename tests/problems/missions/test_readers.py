@@ -1,4 +1,4 @@
-"""Files of others, as missions."""
+"""Import of third-party files as missions."""
 
 import sys
 from datetime import date
@@ -56,7 +56,7 @@ def file(tmp_path):
 
 
 def test_calls_are_tasks_at_their_hour(file):
-    """Place in km, hours since the first call, pump hours or 1; what has no place is left out, and told."""
+    """Places in km, hours since the first call, pump hours or 1; calls without a place are left out and reported."""
     told = []
     mission = import_mission("london", file(CALLS), RecordOptions(agents=3, compress=2), report=told.append)
     assert mission.instance.task_ids == ("1", "2", "2-2")
@@ -70,7 +70,7 @@ def test_calls_are_tasks_at_their_hour(file):
 
 
 def test_days_can_be_chosen(file):
-    """Hours count from the beginning of the first day that is wanted; the last day is included."""
+    """Hours count from the start of the first selected day; the last day is included."""
     wanted = RecordOptions(first=date(2020, 2, 2), last=date(2020, 2, 3))
     mission = import_mission("london", file(CALLS), wanted)
     assert mission.appears.tolist() == [0, 42]
@@ -79,7 +79,7 @@ def test_days_can_be_chosen(file):
 
 
 def test_the_fleet_names_the_agents(file):
-    """Pumping appliances in service are the agents, at most as many as are wanted."""
+    """Pumping appliances in service are the agents, up to the requested number."""
     fleet = file(
         "Fleet No,Operational Status,Type of Vehicle\n"
         "p1,ACTIVE,Pumping Appliance\np2,RESERVE,Pumping Appliance\nc3,ACTIVE,Car\np4,ACTIVE,Pumping Appliance\n",
@@ -105,7 +105,7 @@ def test_fires_are_tasks_at_their_day(file):
 
 
 def test_printed_cfstp(file):
-    """Tasks come in the order of their numbers; distances are Manhattan's, and coalitions work at a pace of 1 to 2."""
+    """Tasks are in the order of their numbers, distances Manhattan, and coalitions work at a pace of 1 to 2."""
     mission = import_mission("cfstp", file(PRINTED))
     assert mission.instance.task_position[:, :2].tolist() == [[3, 12], [9, 2]]
     assert (mission.instance.workload.tolist(), mission.deadline.tolist()) == ([18, 5], [60, 40])
@@ -114,7 +114,7 @@ def test_printed_cfstp(file):
 
 
 def test_space_configurations(file):
-    """Places and amounts are within their bounds, later tasks come in waves, 0 is a radius without a limit."""
+    """Places and workloads are within bounds, later tasks come in waves, and a radius of 0 means unlimited."""
     mission = import_mission("space", file(CONFIG, "c.yaml"), seed=4)
     instance = mission.instance
     assert (instance.n, instance.m) == (3, 8)
@@ -130,7 +130,7 @@ def test_space_configurations(file):
 
 
 def test_space_needs_yaml(file, monkeypatch):
-    """Without PyYAML one line says what to install."""
+    """Without PyYAML, the error says what to install."""
     monkeypatch.setitem(sys.modules, "yaml", None)
     with pytest.raises(MissingPackageError, match=r"alloc-mrta\[tables\]"):
         import_mission("space", file(CONFIG, "c.yaml"))
@@ -155,7 +155,7 @@ def test_space_needs_yaml(file, monkeypatch):
     ],
 )
 def test_faults_name_file_and_place(file, kind, text, told):
-    """What is wrong in a file is one line with the file and the place in it."""
+    """A fault in a file is a one-line error with the file and the place in it."""
     path = file(text)
     with pytest.raises(InputError) as caught:
         import_mission(kind, path)
@@ -164,7 +164,7 @@ def test_faults_name_file_and_place(file, kind, text, told):
 
 
 def test_wrong_options(file):
-    """Options that a format does not take, or that are out of range, are errors that name them."""
+    """Options that a format does not take or that are out of range are errors that name them."""
     for options, kind, told in (
         (RecordOptions(), "space", "options: are for records, not for space"),
         (RecordOptions(fleet="x.csv"), "new-brunswick", "fleet: is for london"),

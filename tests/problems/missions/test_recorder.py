@@ -1,4 +1,4 @@
-"""The course of a mission: it is what the simulation did, and nothing is lost on the way."""
+"""The recorded course of a mission agrees with its simulation and is complete."""
 
 import math
 from itertools import pairwise
@@ -12,8 +12,8 @@ from alloc.problems.missions.simulation.state import AgentStatus, TaskStatus
 
 
 @pytest.mark.parametrize("family", ["failures", "recharging", "growth", "deadlines", "silence"])
-def test_a_course_is_what_the_simulation_did(family: str) -> None:
-    """Legs follow each other without a gap, add up to the distance flown, and tasks end as the result says."""
+def test_a_course_agrees_with_the_simulation(family: str) -> None:
+    """Legs have no gaps and add up to the distance flown, and tasks end as in the result."""
     mission = random_mission(MissionParameters(family=family, agents=4, tasks=6, loss=0.2), seed=3)
     run = simulate(mission, "greedy")
     course = course_of(run.log)
@@ -29,7 +29,7 @@ def test_a_course_is_what_the_simulation_did(family: str) -> None:
 
 
 def test_recording_changes_nothing() -> None:
-    """With a recorder that looks at what agents know, the same happens as without one."""
+    """A recorder of agents' knowledge does not change the simulation."""
     mission = random_mission(MissionParameters(family="silence", agents=5, tasks=6, loss=0.3), seed=1)
     recorder = Recorder(with_knowledge=True)
     recorded = simulate(mission, "hedonic", seed=2, observe=recorder)
@@ -37,8 +37,8 @@ def test_recording_changes_nothing() -> None:
     assert recorder.course(recorded.result).awareness is not None
 
 
-def test_work_left_of_a_task_that_comes_grows_is_changed_and_done() -> None:
-    """Nothing before it appears; 1 more an hour until somebody works; 3 less an hour then; changed at once."""
+def test_work_left_follows_appearance_growth_change_and_work() -> None:
+    """0 before the task appears, then 1 more per hour until an agent works, then 3 less per hour; changes are jumps."""
     instance = Instance(
         ability=[3], speed=[1], agent_position=[[0, 0]], workload=[6], task_position=[[2, 0]], task_ids=["dam"]
     )

@@ -1,4 +1,4 @@
-"""The reference simulation: laws on missions of every kind, and small missions whose course is known."""
+"""The reference simulation: conservation laws on random missions, and small missions with a known course."""
 
 import numpy as np
 import pytest
@@ -34,7 +34,7 @@ def run(mission, orders, **options):
 @given(missions(), st.integers(0, 100))
 @settings(max_examples=40, deadline=None)
 def test_nothing_is_lost(mission, seed):
-    """Under any orders each unit of work and of energy is accounted for at the end, as at every event on the way."""
+    """Under random orders, all work and energy is accounted for at every event and at the end."""
     state = run_wildly(mission, seed).state
     conservation.check(state)
     for task in state.tasks:
@@ -46,8 +46,8 @@ def test_nothing_is_lost(mission, seed):
             assert agent.battery >= -1e-9 * max(1, agent.capacity)
 
 
-def test_broken_ledgers_are_noticed():
-    """Work, energy, places and deadlines that do not add up are each told."""
+def test_inconsistent_ledgers_are_detected():
+    """Inconsistent work, energy, places and deadlines are each an error."""
     breaks = {
         "appeared or grew": lambda state: setattr(state.tasks[0], "done", 99.0),
         "battery of 'a1' lost": lambda state: setattr(state.agents[0], "battery", 1.0),
@@ -64,8 +64,8 @@ def test_broken_ledgers_are_noticed():
 
 @given(instances(speeds=True), st.randoms(use_true_random=False))
 @settings(max_examples=40, deadline=None)
-def test_a_mission_in_which_nothing_happens_scores_as_its_instance(instance, random):
-    """With all known and one task per agent, completion times and energy are those of `evaluate`."""
+def test_a_mission_without_events_scores_as_its_instance(instance, random):
+    """With full knowledge and one task per agent, completion times and energy are those of `evaluate`."""
     allows = instance.reach.mask[instance.reach.origin]
     task = [random.choice([-1, *np.flatnonzero(row).tolist()]) for row in allows]
     score = evaluate(instance, Allocation(task))
@@ -82,7 +82,7 @@ def test_a_mission_in_which_nothing_happens_scores_as_its_instance(instance, ran
 
 @pytest.mark.parametrize("metric", ["euclidean", "manhattan", "geographic"])
 def test_agents_are_diverted_in_flight(metric):
-    """Halfway to one task an agent is sent to another: it has flown half the way, and flies on from where it is."""
+    """An agent diverted halfway to a task has flown half the distance, and flies on from its present place."""
     instance = Instance(
         ability=[1], workload=[5, 5], agent_position=[[0, 0]], task_position=[[1, 1], [0, 1]], speed=[1], metric=metric
     )
@@ -100,8 +100,8 @@ def test_agents_are_diverted_in_flight(metric):
     assert simulation.state.switches == 1
 
 
-def test_on_given_ways_agents_are_diverted_at_their_end():
-    """With distances of one's own, an agent in flight goes to its goal first, and on from there without work."""
+def test_with_own_distances_agents_are_diverted_at_the_end_of_a_flight():
+    """With own distances, an agent in flight first completes that flight, and goes on from there without working."""
     distances = [("a1", "t1", 2), ("t1", "t2", 3), ("a1", "t2", 9)]
     instance = Instance(ability=[1], workload=[5, 4], speed=[1], distances=distances)
     mission = Mission(instance, events=[Event(1, "task-changes", task="t1", workload=5)])
@@ -110,8 +110,8 @@ def test_on_given_ways_agents_are_diverted_at_their_end():
     assert state.agents[0].distance == 8
 
 
-def test_who_cannot_finish_a_flight_does_not_begin_it():
-    """Battery, range, skills, lists and the way back are each a reason not to fly, also when diverted."""
+def test_infeasible_flights_are_refused():
+    """Battery, range, skills, allowed tasks and the flight home are each a reason to refuse, also in flight."""
     cases = {
         "battery 3": {"battery": [3.0]},
         "range 3": {"communication_range": [3.0]},
@@ -129,8 +129,8 @@ def test_who_cannot_finish_a_flight_does_not_begin_it():
         assert simulation.log.records[-1]["record"] == "refused"
 
 
-def test_growth_ends_when_somebody_works():
-    """Work grows from appearance until the first agent arrives, and not again when it leaves."""
+def test_growth_ends_when_an_agent_works():
+    """Work grows from appearance until the first agent arrives, and no longer grows when it leaves."""
     mission = Mission(
         ONE,
         growth=[1.0],
@@ -143,7 +143,7 @@ def test_growth_ends_when_somebody_works():
 
 
 def test_coalitions_change_while_they_work():
-    """Who comes later helps from then on, who fails no longer does."""
+    """An agent that arrives later helps from then on; one that fails no longer does."""
     instance = Instance(
         ability=[1, 2], workload=[10], agent_position=[[0, 0], [2, 0]], task_position=[[0, 0]], speed=[1, 1]
     )
@@ -153,7 +153,7 @@ def test_coalitions_change_while_they_work():
 
 
 def test_completions_come_before_deadlines_and_events_of_the_hour():
-    """A task whose last work is done at its deadline, or when it is cancelled, is done; else it is missed."""
+    """A task completed exactly at its deadline, or at its cancellation, is done; otherwise it is missed."""
     mission = Mission(ONE, deadline=[5.0])
     assert run(mission, {0: {"a1": Order("t1")}}).state.tasks[0].status is TaskStatus.DONE
     cancelled = Mission(ONE, events=[Event(5.0, "task-cancelled", task="t1")])
@@ -163,7 +163,7 @@ def test_completions_come_before_deadlines_and_events_of_the_hour():
 
 
 def test_events_of_one_hour_happen_in_the_order_of_the_file():
-    """More work and then less is less, and the other way round is more."""
+    """Of two changes of the work left at the same hour, the later one in the file counts."""
     for amounts, total in (((9, 3), 3.0), ((3, 9), 9.0)):
         events = [Event(1, "task-changes", task="t1", workload=amount) for amount in amounts]
         simulation = Simulation(Mission(ONE, events=events))
@@ -173,7 +173,7 @@ def test_events_of_one_hour_happen_in_the_order_of_the_file():
 
 
 def test_pace_changes_from_period_to_period():
-    """A group's work is that of each hour's factor, which is the same whatever it did before."""
+    """A group works by the factor of each hour, which does not depend on earlier events."""
     mission = Mission(ONE, pace=Pace(0.5, 1.5, 1.0), seed=3)
     task = run(mission, {0: {"a1": Order("t1")}}).state.tasks[0]
     hours = np.diff([2.0, *range(3, int(task.closed) + 1), task.closed])
@@ -181,8 +181,8 @@ def test_pace_changes_from_period_to_period():
     assert 2 * np.dot(hours, factors) == pytest.approx(6.0, rel=1e-9)
 
 
-def test_recharging_lets_an_agent_go_on():
-    """An agent without energy takes the task once it is recharged."""
+def test_a_recharged_agent_can_go_on():
+    """An agent without energy can take the task once it is recharged."""
     instance = Instance(
         ability=[1], workload=[1], agent_position=[[0, 0]], task_position=[[4, 0]], speed=[1], battery=[1]
     )
@@ -191,8 +191,8 @@ def test_recharging_lets_an_agent_go_on():
     assert (state.tasks[0].closed, state.agents[0].battery) == (7.0, 0.0)
 
 
-def test_whoever_flies_at_the_end_lands_and_whoever_returns_is_home():
-    """Flights that go on at the horizon count in full, and the way back of those that return as well."""
+def test_flights_are_completed_at_the_end():
+    """Flights in progress at the horizon count in full, and so do flights home of agents that return."""
     instance = Instance(
         ability=[1, 1], workload=[99, 99], agent_position=[[0, 0]] * 2, task_position=[[4, 0], [0, 3]], speed=[1, 1],
         returns=[False, True],
@@ -202,7 +202,7 @@ def test_whoever_flies_at_the_end_lands_and_whoever_returns_is_home():
 
 
 def test_agents_return_to_their_base_if_they_have_flown():
-    """A base costs energy for the way there; who never flew stays, and who cannot afford it does not set out."""
+    """Flights to a base cost energy; agents that never flew stay, and those that cannot afford it do not depart."""
     instance = Instance(
         ability=[1, 1, 1], workload=[1, 1], agent_position=[[0, 0], [0, 0], [0, 0]], task_position=[[4, 0], [0, 3]],
         speed=[1, 1, 1], battery=[9, 9, 9], energy_per_distance=1.0, return_base=[0, 0, 0], bases={"dock": [4, 3]},
@@ -225,7 +225,7 @@ def test_the_same_seed_gives_the_same_course():
 
 
 def test_stopping_counts_as_a_switch_only_where_work_is_left():
-    """An agent called off its task switches; one whose task is done does not."""
+    """Calling an agent off its task is a switch; an agent whose task is done does not switch."""
     mission = Mission(ONE, events=[Event(4, "task-changes", task="t1", workload=5)])
     assert run(mission, {0: {"a1": Order("t1")}, 4: {"a1": STAY}}).state.switches == 1
     assert run(Mission(ONE), {0: {"a1": Order("t1")}}).state.switches == 0
