@@ -9,6 +9,7 @@ from queue import SimpleQueue
 from types import MappingProxyType
 
 from alloc.allocators.online.contract import AgentDecider, Briefing, FleetDecider, Policy, PolicyError
+from alloc.allocators.online.planner.register import MOST_OVER
 from alloc.allocators.online.planner.state import LiveState
 from alloc.problems.missions.simulation.reports import AgentReport, View
 from alloc.problems.missions.simulation.state import STAY, AgentStatus, Order
@@ -157,6 +158,7 @@ class Leader:
         decision.is_whole, self.last = True, decision
 
     def _one_by_one(self, view: View, names: list[str]) -> Iterator[tuple[str, Order | None]]:
+        self._forget_deciders(len(names))
         agents = dict(view.agents)
         distances, known = self._state.distances, MappingProxyType(agents)
         for name in names:
@@ -164,6 +166,12 @@ class Leader:
             if order is not None:
                 agents[name] = _ordered(agents[name], _order(order))
             yield name, order
+
+    def _forget_deciders(self, count: int) -> None:
+        """Keep those of agents that are known, where far more have been than there are agents."""
+        if len(self._agents) > 2 * (count + MOST_OVER):
+            known = self._state.all_agents
+            self._agents = {name: decider for name, decider in self._agents.items() if name in known}
 
     def _decider(self, name: str) -> AgentDecider:
         if name not in self._agents:

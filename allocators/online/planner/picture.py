@@ -13,7 +13,7 @@ from alloc.problems.missions.mission import Mission
 from alloc.problems.missions.simulation.agenda import Agenda, Arrival, Changes, Completion, Turn
 from alloc.problems.missions.simulation.changes import happen, land, obey
 from alloc.problems.missions.simulation.motion import close, completion_hour, refusal, status_at_deadline
-from alloc.problems.missions.simulation.reports import AgentReport, TaskReport, View, report_agent, report_task
+from alloc.problems.missions.simulation.reports import AgentReport, View, report_agent, report_task
 from alloc.problems.missions.simulation.state import (
     ACTIVE,
     AgentState,
@@ -38,6 +38,10 @@ WORDS = {
 
 MOST_ENTRIES = 4
 """On the agenda, for each agent and task: at most two of them are not void."""
+
+
+MOST_NEWS = 1000
+"""Of what happened since the last plan, so much is kept at least."""
 
 
 @dataclass(frozen=True)
@@ -175,11 +179,12 @@ class Picture:
                 only = frozenset(() if task is None else (task,))
                 report = replace(report, facts=replace(report.facts, tasks=only))
             agents[agent.facts.id] = report
-        wanted = {report.task for report in agents.values()}
-        tasks: dict[str, TaskReport] = {}
-        for task_state in self.state.tasks:
-            if task_state.status is TaskStatus.OPEN or task_state.facts.id in wanted:
-                tasks[task_state.facts.id] = report_task(self.state, task_state)
+        shown = {task.facts.id: task for task in self.state.tasks if task.status is TaskStatus.OPEN}
+        over = {report.task for report in agents.values() if report.task is not None} - shown.keys()
+        if over:
+            wanted = [*shown.values(), *map(self.state.task, over)]
+            shown = {task.facts.id: task for task in sorted(wanted, key=lambda task: task.index)}
+        tasks = {name: report_task(self.state, task) for name, task in shown.items()}
         return View(self.state.hour, None, agents, tasks, self.state.distances)
 
     def refusal(self, name: str, task: str) -> str | None:
@@ -210,10 +215,12 @@ class Picture:
         """Add to the news."""
         self.news.append(news)
         self.told += 1
+        if len(self.news) > 2 * MOST_NEWS:
+            del self.news[:-MOST_NEWS]  # nobody has planned for long, or a policy fails
 
     def forget(self, count: int) -> None:
         """Forget the first of all that was ever told, as many as `count`."""
-        del self.news[: len(self.news) - (self.told - count)]
+        del self.news[: max(0, len(self.news) - (self.told - count))]
 
     def _tell(self, text: str, agent: str | None = None, task: str | None = None) -> None:
         self.tell(News(self.state.hour, text, agent, task))
@@ -227,6 +234,7 @@ class Picture:
             left = agent.task
             happen(state, event)
             self._changes.note_agent(agent, left)
+            state.file_agent(agent)
             return
         task = state.task(event.task)
         if event.kind is EventKind.TASK_APPEARS:
@@ -237,6 +245,7 @@ class Picture:
             self._note_deadline(task)
         workers = tuple(task.workers.values())
         happen(state, event)
+        state.file_task(task)
         self._changes.note_task(task)
         for agent in workers:
             self._changes.note_agent(agent)
@@ -264,6 +273,7 @@ class Picture:
     def _close(self, task: TaskState, status: TaskStatus) -> None:
         workers = tuple(task.workers.values())
         close(self.state, task, status)
+        self.state.file_task(task)
         self._changes.note_task(task)
         for agent in workers:
             self._changes.note_agent(agent)

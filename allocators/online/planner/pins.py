@@ -3,7 +3,7 @@
 from alloc.allocators.online.planner.picture import News, Picture
 from alloc.problems.arguments import shown, text
 from alloc.problems.errors import InputError
-from alloc.problems.missions.simulation.state import ACTIVE, STAY, AgentStatus, Order, TaskStatus
+from alloc.problems.missions.simulation.state import ACTIVE, STAY, Order, TaskStatus
 
 
 class Pins:
@@ -45,13 +45,12 @@ class Pins:
 
     def lapse(self) -> None:
         """Forget the pins of tasks that are over, and of agents that have failed."""
+        if not self.tasks:
+            return
         state = self._picture.state
-        self.tasks = {
-            agent: task
-            for agent, task in self.tasks.items()
-            if (task is None or state.task(task).status is TaskStatus.OPEN)
-            and state.agent(agent).status is not AgentStatus.FAILED
-        }
+        there = {agent.facts.id for agent in state.agents}
+        tasks = {None, *(task.facts.id for task in state.tasks if task.status is TaskStatus.OPEN)}
+        self.tasks = {agent: task for agent, task in self.tasks.items() if agent in there and task in tasks}
 
     def order(self, agent: str) -> Order | None:
         """Return the order of an agent by its pin; None if it is not pinned."""

@@ -4,7 +4,8 @@ import json
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import fields, replace
+from typing import Any
 
 from alloc.allocators.online.planner.picture import News, Picture
 from alloc.allocators.online.planner.plan import OrderChange, Plan
@@ -17,7 +18,16 @@ from alloc.problems.formats.messages import told
 from alloc.problems.missions.files.document import mission_from_document, mission_to_document
 from alloc.problems.missions.mission import Mission
 from alloc.problems.missions.simulation.places import Place
-from alloc.problems.missions.simulation.state import AgentState, AgentStatus, Flight, Order, TaskState, TaskStatus
+from alloc.problems.missions.simulation.state import (
+    AgentFacts,
+    AgentState,
+    AgentStatus,
+    Flight,
+    Order,
+    TaskFacts,
+    TaskState,
+    TaskStatus,
+)
 
 PLANNER_FORMAT = "alloc-planner/1"
 
@@ -31,9 +41,13 @@ def document_of(picture: Picture, plan: Plan) -> Row:
     return {
         "hour": state.hour,
         "mission": mission_to_document(state.mission),
-        "arrivals": state.arrivals,
-        "agents": [_agent(agent) for agent in state.agents],
-        "tasks": [_task(task) for task in state.tasks],
+        "ever": {"agents": state.all_agents.ever, "tasks": state.all_tasks.ever},
+        "forgotten": {
+            "agents": state.all_agents.ever - len(state.all_agents),
+            "tasks": state.all_tasks.ever - len(state.all_tasks),
+        },
+        "agents": [_agent(agent, state.mission.instance.n) for agent in state.all_agents],
+        "tasks": [_task(task, state.mission.instance.m) for task in state.all_tasks],
         "news": [vars(news) for news in picture.news],
         "plan": {
             "hour": plan.hour,
@@ -95,14 +109,25 @@ def mission_of(document: Row) -> Mission:
 def restored(document: Row, picture: Picture) -> Plan:
     """Put what was saved into the picture of a new planner of the same mission, and return the plan."""
     state, hour = picture.state, document["hour"]
-    for arrival in _rows(document["arrivals"]):
-        state.admit(arrival)
     rows = _rows(document["agents"]), _rows(document["tasks"])
-    for task, row in zip(state.tasks, rows[1], strict=True):
-        _restore_task(task, row)
-    for agent, row in zip(state.agents, rows[0], strict=True):
-        _restore_agent(picture, agent, row)
-    for task, row in zip(state.tasks, rows[1], strict=True):
+    ever, forgotten = require_object(document["ever"]), require_object(document["forgotten"])
+    for kind, some in (("agents", rows[0]), ("tasks", rows[1])):
+        if len(some) + _whole(forgotten[kind]) != _whole(ever[kind]):
+            raise ValueError(f"{len(some)} {kind} of {ever[kind]}")
+    state.all_agents.restore(
+        [str(row["id"]) for row in rows[0]], map(_new_agent, _later(rows[0])), _whole(ever["agents"])
+    )
+    state.all_tasks.restore([str(row["id"]) for row in rows[1]], map(_new_task, _later(rows[1])), _whole(ever["tasks"]))
+    for row in rows[1]:
+        _restore_task(state.task(str(row["id"])), row)
+    for row in rows[0]:
+        _restore_agent(picture, state.agent(str(row["id"])), row)
+    for task in sorted(state.all_tasks, key=lambda task: task.closed):
+        state.file_task(task)
+    for agent in state.all_agents:
+        state.file_agent(agent)
+    for row in rows[1]:
+        task = state.task(str(row["id"]))
         workers = [state.agent(str(name)) for name in row["workers"]]  # type: ignore[attr-defined]
         task.workers = {agent.index: agent for agent in workers}
         for agent in workers:
@@ -123,10 +148,11 @@ def restored(document: Row, picture: Picture) -> Plan:
     return Plan(float(str(plan["hour"])), found, bool(plan["is_new"]), problem, changes)
 
 
-def _agent(agent: AgentState) -> Row:
+def _agent(agent: AgentState, begun_with: int) -> Row:
     flight = agent.flight
     return {
         "id": agent.facts.id,
+        **_came(agent, begun_with),
         "status": str(agent.status),
         "place": _place(agent.place),
         "order": order_to_row(agent.order),
@@ -144,9 +170,10 @@ def _agent(agent: AgentState) -> Row:
     }
 
 
-def _task(task: TaskState) -> Row:
+def _task(task: TaskState, begun_with: int) -> Row:
     return {
         "id": task.facts.id,
+        **_came(task, begun_with),
         "status": str(task.status),
         "appears": task.facts.appears,
         "begun": task.begun,
@@ -156,12 +183,62 @@ def _task(task: TaskState) -> Row:
     }
 
 
+def _came(one: AgentState | TaskState, begun_with: int) -> Row:
+    """Return what the mission does not say: all of an agent or a task that came later."""
+    if one.index < begun_with:
+        return {}
+    facts = {field.name: _plain(getattr(one.facts, field.name)) for field in fields(one.facts)}
+    workload = {"workload": one.workload} if isinstance(one, TaskState) else {}
+    return {"index": one.index, **workload, "facts": facts}
+
+
+def _plain(value: object) -> object:
+    if isinstance(value, Place):
+        return _place(value)
+    if isinstance(value, frozenset):
+        return sorted(value)
+    return _finite(value) if isinstance(value, float) else value
+
+
+def _facts(row: Row) -> dict[str, Any]:
+    """Return the facts of an agent or a task by their names."""
+    return {name: _fact(name, value) for name, value in require_object(row["facts"]).items()}
+
+
+def _fact(name: str, value: Any) -> object:
+    if name in ("id", "returns"):
+        return value
+    if name in ("start", "base", "place"):
+        return None if value is None else _to_place(value)
+    if name in ("skills", "needs", "tasks"):
+        return None if value is None else frozenset(map(str, value))
+    return math.inf if value is None else float(value)
+
+
+def _new_agent(row: Row) -> AgentState:
+    facts = AgentFacts(**_facts(row))
+    return AgentState(_whole(row["index"]), facts, facts.start, 0.0, 0.0)
+
+
+def _new_task(row: Row) -> TaskState:
+    return TaskState(_whole(row["index"]), TaskFacts(**_facts(row)), float(str(row["workload"])))
+
+
+def _whole(value: object) -> int:
+    return int(str(value))
+
+
 def _place(place: Place) -> Row:
     return {"position": place.position, "nodes": place.nodes}
 
 
 def _finite(value: float) -> float | None:
     return None if value == math.inf else value
+
+
+def _later(rows: list[Row]) -> list[Row]:
+    """Return the rows of those that came after the mission began."""
+    return [row for row in rows if "facts" in row]
 
 
 def _rows(value: object) -> list[Row]:
@@ -183,10 +260,10 @@ def _restore_agent(picture: Picture, agent: AgentState, row: Row) -> None:
     assert order is not None
     agent.order, agent.flight, agent.task = order, None, None
     if flight is not None:
-        fields = require_object(flight)
-        task = None if fields["task"] is None else picture.state.task(str(fields["task"]))
-        hours = (float(str(fields[name])) for name in ("distance", "departs", "arrives"))
-        agent.flight = Flight(_to_place(fields["source"]), _to_place(fields["goal"]), task, *hours)
+        said = require_object(flight)
+        task = None if said["task"] is None else picture.state.task(str(said["task"]))
+        hours = (float(str(said[name])) for name in ("distance", "departs", "arrives"))
+        agent.flight = Flight(_to_place(said["source"]), _to_place(said["goal"]), task, *hours)
     _restore_ledgers(agent, row, AGENT_LEDGERS)
 
 
@@ -197,8 +274,8 @@ def _restore_ledgers(state: AgentState | TaskState, row: Row, names: tuple[str, 
 
 
 def _to_place(row: object) -> Place:
-    fields = require_object(row)
-    nodes, position = fields["nodes"], fields["position"]
+    place = require_object(row)
+    nodes, position = place["nodes"], place["position"]
     return Place(_to_position(position), tuple(int(node) for node in nodes))  # type: ignore[attr-defined]
 
 
@@ -212,6 +289,6 @@ def _to_position(value: object) -> tuple[float, float, float] | None:
 def _order(row: object) -> Order | None:
     if row is None:
         return None
-    fields = require_object(row)
-    task = fields["task"]
-    return Order(None if task is None else str(task), _to_position(fields.get("position")))
+    order = require_object(row)
+    task = order["task"]
+    return Order(None if task is None else str(task), _to_position(order.get("position")))

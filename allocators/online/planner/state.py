@@ -2,8 +2,8 @@
 
 from dataclasses import replace
 
-from alloc.problems.arguments import shown
-from alloc.problems.errors import InputError, nearest
+from alloc.allocators.online.planner.register import Register
+from alloc.problems.errors import InputError
 from alloc.problems.formats.json_columns import Row
 from alloc.problems.missions.events import EventKind
 from alloc.problems.missions.files.document import (
@@ -14,7 +14,9 @@ from alloc.problems.missions.files.document import (
 )
 from alloc.problems.missions.mission import Mission
 from alloc.problems.missions.simulation.places import Place
-from alloc.problems.missions.simulation.state import AgentState, MissionState, TaskState
+from alloc.problems.missions.simulation.state import AgentState, AgentStatus, MissionState, TaskState, TaskStatus
+
+TO_DO = (TaskStatus.TO_COME, TaskStatus.OPEN)
 
 
 class LiveState(MissionState):
@@ -26,29 +28,45 @@ class LiveState(MissionState):
 
     Attributes
     ----------
-    arrivals : list of dict
-        The events that brought agents and tasks, each as a whole, in their order.
+    agents : list of AgentState
+        Those that have not failed.
+    tasks : list of TaskState
+        Those that are open or to come.
+    all_agents, all_tasks : Register
+        These, and the last of those that have failed or are over.
     """
 
     def __init__(self, mission: Mission) -> None:
         super().__init__(mission)
-        self.arrivals: list[Row] = []
-        self._agent_index = dict(mission.instance.agent_index)
-        self._task_index = dict(mission.instance.task_index)
+        self.all_agents, self.all_tasks = Register("agent", self.agents), Register("task", self.tasks)
+        self.agents, self.tasks = self.all_agents.lasting, self.all_tasks.lasting
         document = mission_to_document(mission)
         self._header = {name: document[name] for name in HEADER_FIELDS if name in document and name != "distances"}
 
     def agent(self, name: str | None) -> AgentState:
         """Return an agent by its id."""
-        if name not in self._agent_index:
-            raise InputError(f"there is no agent {shown(name)}{nearest(str(name), tuple(self._agent_index))}", "agent")
-        return self.agents[self._agent_index[name]]
+        return self.all_agents.find(name)
 
     def task(self, name: str | None) -> TaskState:
         """Return a task by its id."""
-        if name not in self._task_index:
-            raise InputError(f"there is no task {shown(name)}{nearest(str(name), tuple(self._task_index))}", "task")
-        return self.tasks[self._task_index[name]]
+        return self.all_tasks.find(name)
+
+    def file_agent(self, agent: AgentState) -> None:
+        """Keep an agent among those that may still take orders, unless it has failed."""
+        self.all_agents.file(agent, is_over=agent.status is AgentStatus.FAILED)
+        self.all_agents.forget()
+
+    def file_task(self, task: TaskState) -> None:
+        """Keep a task among those to be done or among those that are over, as it is now.
+
+        A task that is over is not forgotten while an agent is on its way there.
+        """
+        self.all_tasks.file(task, is_over=task.status not in TO_DO)
+        if self.all_tasks.is_full:
+            goals = {agent.order.task for agent in self.agents}
+            flights = (agent.flight for agent in self.agents)
+            goals.update(flight.task.facts.id for flight in flights if flight is not None and flight.task is not None)
+            self.all_tasks.forget(goals)
 
     def admit(self, event: Row) -> None:
         """Add the agent or the task that comes with an event, as one that is still to come.
@@ -67,14 +85,12 @@ class LiveState(MissionState):
         row = event[kind]
         assert isinstance(row, dict)
         name = str(row["id"])
-        if name in (self._agent_index if kind == "agent" else self._task_index):
-            raise InputError(f"there is {kind} {shown(name)} already", f"{kind}.id")
+        (self.all_agents if kind == "agent" else self.all_tasks).require_new(name)
         new = MissionState(self._alone(event, kind, row))
         if kind == "agent":
             self._add_agent(new.agents[-1], row)
         else:
             self._add_task(new.tasks[-1])
-        self.arrivals.append(event)
 
     def _alone(self, event: Row, kind: str, row: Row) -> Mission:
         """Return a mission of what is new, beside what it names and what a mission needs."""
@@ -86,7 +102,7 @@ class LiveState(MissionState):
         else:
             listed = row.get("tasks")
             named = [*(listed if isinstance(listed, list) else ()), row.get("start_task")]
-            known = {str(name): None for name in named if str(name) in self._task_index}
+            known = {str(name): None for name in named if str(name) in self.all_tasks}
             tasks = [{"id": one, "workload": 1, "position": self._position(one)} for one in known]
             tasks = tasks or [{**other, "workload": 1}]
         document = {**self._header, "format": MISSION_FORMAT, "agents": agents, "tasks": tasks, "events": [event]}
@@ -102,13 +118,11 @@ class LiveState(MissionState):
     def _add_agent(self, agent: AgentState, row: Row) -> None:
         start = row.get("start_task")
         place = Place(agent.facts.start.position) if start is None else self.task(str(start)).facts.place
-        agent.index, agent.facts, agent.place = len(self.agents), replace(agent.facts, start=place), place
-        self.agents.append(agent)
-        self._agent_index[agent.facts.id] = agent.index
+        agent.index, agent.facts, agent.place = self.all_agents.ever, replace(agent.facts, start=place), place
+        self.all_agents.add(agent)
 
     def _add_task(self, task: TaskState) -> None:
-        task.index = len(self.tasks)
+        task.index = self.all_tasks.ever
         place = Place(task.facts.place.position, (self.mission.instance.n + task.index,))
         task.facts = replace(task.facts, place=place)
-        self.tasks.append(task)
-        self._task_index[task.facts.id] = task.index
+        self.all_tasks.add(task)
