@@ -8,7 +8,7 @@ from alloc.problems.arguments import shown
 from alloc.problems.errors import InputError, nearest
 from alloc.problems.missions.simulation.state import AgentState, TaskState
 
-MOST_OVER = 1000
+MOST_OVER = 200
 """How many are kept at least of those that are over, the last ones; twice as many at most."""
 
 One = TypeVar("One", AgentState, TaskState)
@@ -34,7 +34,7 @@ class Register(Generic[One]):
 
     def __init__(self, kind: str, all_there: list[One]) -> None:
         self._kind, self.lasting, self.ever = kind, [*all_there], len(all_there)
-        self._by_id = {one.facts.id: one for one in all_there}
+        self._by_id: dict[str, One] = {one.facts.id: one for one in all_there}
         self._over: dict[str, One] = {}
 
     def __contains__(self, name: str) -> bool:
@@ -92,7 +92,7 @@ class Register(Generic[One]):
     def restore(self, names: Collection[str], later: Iterable[One], ever: int) -> None:
         """Know these alone, as when a planner was saved: of those that were there, and of those that came later."""
         known = dict.fromkeys(names)
-        self._by_id = {one.facts.id: one for one in (*self.lasting, *later) if one.facts.id in known}
+        self._by_id = {one.facts.id: one for one in (*self, *later) if one.facts.id in known}
         if len(self._by_id) < len(known):
             raise ValueError(f"some {self._kind} is not there")
         self.lasting[:] = self._by_id.values()

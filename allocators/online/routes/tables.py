@@ -12,6 +12,9 @@ from alloc.problems.vocabulary import GEOGRAPHIC, MANHATTAN
 NEAR = 24
 """Number of nearest tasks kept for each task."""
 
+MOST_WAYS = 10_000
+"""Distances between tasks of which more are kept than of those that are there, before all are looked up anew."""
+
 
 def positions(places: list[Place]) -> Floats:
     """Return the positions of places, shape (p, 3); NaN where unknown."""
@@ -74,6 +77,8 @@ class TaskTables:
 
     def _between(self, view: View, tasks: list[TaskReport]) -> Floats:
         table = np.zeros((len(tasks), len(tasks)))
+        if len(self._ways) > 4 * (table.size + MOST_WAYS):
+            self._ways.clear()  # those of tasks that were over long ago among them
         for i, one in enumerate(tasks):
             for j, other in enumerate(tasks):
                 pair = one.facts.id, other.facts.id
