@@ -16,7 +16,7 @@ STANDARD_STREAM = "-"
 PathLike = str | os.PathLike[str]
 
 _MOST_LINKS = 40
-"""Maximum length of a chain of symbolic links, as in the kernel."""
+"""Maximum number of symbolic links to follow, as in the kernel."""
 
 _NO_MOVE = {
     errno.EACCES,

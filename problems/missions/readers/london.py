@@ -56,7 +56,7 @@ def read_london(path: str, options: RecordOptions) -> Records:
     if lost:
         found.notes.append(f"{counted(lost, 'call')} without a place or an hour left out")
     if filled:
-        found.notes.append(f"{counted(filled, 'call')} without pump hours taken for {USUAL_HOURS:g}")
+        found.notes.append(f"{counted(filled, 'call')} without pump hours set to {USUAL_HOURS:g}")
     if options.fleet is not None:
         found.vehicles = _vehicles(options.fleet)
     return found

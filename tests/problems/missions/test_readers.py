@@ -65,7 +65,7 @@ def test_calls_are_tasks_at_their_hour(file):
     assert mission.instance.task_position[0].tolist() == [530, 180, 0]
     assert mission.instance.agent_position[:, :2].tolist() == [[531, 180.5], [528, 177], [531, 180.5]]
     assert mission.instance.speed.tolist() == [30, 30, 30]
-    assert told == ["1 call without a place or an hour left out", "1 call without pump hours taken for 1"]
+    assert told == ["1 call without a place or an hour left out", "1 call without pump hours set to 1"]
     assert mission_to_document(mission_from_document(mission_to_document(mission))) == mission_to_document(mission)
 
 

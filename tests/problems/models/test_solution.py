@@ -89,7 +89,7 @@ def test_fractions_are_told(tmp_path: Path, solver: str) -> None:
         ("# Objective value = 1\nx 1\nz 3\n", "has no variable of a model"),
         ("", "has no variable of a model"),
         ("# Objective value = 1\nx_a9__t 1\n", "line 2: no agent of instance 'instance' has the name 'a9'"),
-        ("# Objective value = 1\nx_a1__s 1\n", "line 2: no task of instance 'instance' is called 's'"),
+        ("# Objective value = 1\nx_a1__s 1\n", "line 2: no task of instance 'instance' has the name 's'"),
         (
             "# Objective value = 1\nx_a1__t 1\nx_a1__north_field 1\n",
             "line 3: with this, there are more tasks than agents like a1",
