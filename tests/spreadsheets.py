@@ -120,19 +120,19 @@ NUMBERS = [
         "one comma that may be either",
         'id,ability\nd1,"1,234"\nd2,7\n',
         error="agents.csv: line 2, column 'ability': '1,234' may be 1.234 or 1234;"
-        " say which by --decimal comma or --decimal point",
+        " specify it by --decimal comma or --decimal point",
     ),
     Case(
         "one point that may be either, between semicolons",
         "id;ability\nd1;1.234\nd2;7\n",
         error="agents.csv: line 2, column 'ability': '1.234' may be 1.234 or 1234;"
-        " say which by --decimal point or --decimal comma",
+        " specify it by --decimal point or --decimal comma",
     ),
     Case(
         "whole numbers and one that may be thousands",
         tasks="Job,Area\nRoof,120\nYard,1.000\n",
         error="tasks.csv: line 3, column 'Area': '1.000' may be 1.000 or 1000;"
-        " say which by --decimal point or --decimal comma",
+        " specify it by --decimal point or --decimal comma",
     ),
     Case("one point between commas", "id,ability\nd1,1.234\n", fields={"ability": [1.234]}),
     Case("the user says comma", "id;ability\nd1;1,234\n", options={"decimal": "comma"}, fields={"ability": [1.234]}),
@@ -150,14 +150,14 @@ NUMBERS = [
     Case(
         "both marks in one column",
         "id;ability\nd1;1,5\nd2;2.5\n",
-        error="agents.csv: column 'ability': has decimal commas and decimal points; write all alike",
+        error="agents.csv: column 'ability': has decimal commas and decimal points; use one of them",
     ),
     Case("exponents and a plus", "id,ability\nd1,1e3\nd2,+2.5E-1\n", fields={"ability": [1000, 0.25]}),
     Case("units behind numbers", "id;ability\nd1;4 kg\nd2;2,5kg\n", fields={"ability": [4, 2.5], "units.work": "kg"}),
     Case(
         "two units behind numbers",
         "id;ability\nd1;4 kg\nd2;2 t\n",
-        error="agents.csv: line 3, column 'ability': is in t, others are in kg; write all in one unit",
+        error="agents.csv: line 3, column 'ability': is in t, others are in kg; use one unit",
     ),
     Case(
         "no number",
@@ -195,7 +195,7 @@ NUMBERS = [
     Case(
         "error of a formula",
         "id,ability\nd1,#REF!\n",
-        error="agents.csv: line 2, column 'ability': holds the error '#REF!' of a formula; mend it",
+        error="agents.csv: line 2, column 'ability': contains the error '#REF!' of a formula; correct it",
     ),
 ]
 
@@ -292,7 +292,7 @@ HEADERS = [
         "two speeds",
         "id,ability,Max speed,Cruise speed\na,1,30,20\n",
         error="agents.csv: columns 'Max speed' and 'Cruise speed' may each be the speed;"
-        " say which, as by --map speed='Max speed'",
+        " specify one, as by --map speed='Max speed'",
     ),
     Case(
         "no header",
@@ -303,7 +303,7 @@ HEADERS = [
         "two columns for the ability",
         "id,Payload,Capacity\nd1,4,5\n",
         error="agents.csv: columns 'Payload' and 'Capacity' may each be the ability;"
-        " say which, as by --map ability=Payload",
+        " specify one, as by --map ability=Payload",
     ),
     Case(
         "two columns for the ability, and the user's choice",
@@ -322,14 +322,14 @@ HEADERS = [
         "weight of a task",
         tasks="id,weight\nt1,5\n",
         error="tasks.csv: column 'weight': may be the workload or the priority;"
-        " say which by --map workload=weight or --map priority=weight",
+        " specify it by --map workload=weight or --map priority=weight",
     ),
     Case("weight of a task in kg", tasks="id,weight [kg]\nt1,5\n", fields={"workload": [5]}),
     Case(
         "unknown name of the ability",
         "id,zing\nd1,4\n",
-        error="agents.csv: no column is known as the ability; the columns are 'id', 'zing';"
-        " say which by --map ability=Capacity, or ability=1 for all alike",
+        error="agents.csv: no column is recognised as the ability; the columns are 'id', 'zing';"
+        " specify it by --map ability=Capacity, or ability=1 for all alike",
     ),
     Case("all abilities alike", "id\nd1\nd2\n", options={"columns": {"ability": "1"}}, fields={"ability": [1, 1]}),
     Case(
@@ -374,13 +374,13 @@ ROWS = [
     Case(
         "the same id twice",
         "id,ability\nd1,4\nd2,2\nd1,3\n",
-        error="agents.csv: line 4, column 'id': 'd1' is the id in line 2 too; rename one",
+        error="agents.csv: line 4, column 'id': 'd1' is also the id in line 2; rename one",
     ),
     Case(
         "a row without id",
         "id,ability\nd1,4\n,2\nd3,5\n",
         fields={"agent_ids": ("d1", "a2", "d3")},
-        lines=("agents.csv: line 3 has no id and is called a2",),
+        lines=("agents.csv: line 3 has no id and is named a2",),
     ),
     Case(
         "no ids",
@@ -439,7 +439,7 @@ VALUES = [
         "priorities that count from the most urgent",
         tasks="id,workload,Prio (1 = urgent)\nt1,5,1\n",
         error="tasks.csv: column 'Prio (1 = urgent)': counts from 1, the most urgent,"
-        " but here larger is more urgent; turn it round",
+        " but here larger is more urgent; reverse it",
     ),
     Case(
         "m/s",
@@ -465,7 +465,7 @@ VALUES = [
         "id,ability [kg/h]\na,1\n",
         "id,workload [m2]\nt1,5\n",
         error="tasks.csv: column 'workload [m2]': is in m2, but work elsewhere in kg,"
-        " and one cannot be turned into the other; use one unit",
+        " which cannot be converted; use one unit",
     ),
     Case(
         "consumption in W",
@@ -539,7 +539,7 @@ PLACES = [
         "coordinates of either kind",
         'id,ability,Location\na,1,"47.1, 8.5"\n',
         error="agents.csv: column 'Location': may be latitude and longitude, or x and y;"
-        " say which by --map gps=Location or --map position=Location",
+        " specify it by --map gps=Location or --map position=Location",
     ),
     Case(
         "coordinates of either kind, and the user's choice",
@@ -551,13 +551,12 @@ PLACES = [
         "degrees here, a plane there",
         "id,ability,lat,lon\na,1,47.1,8.5\n",
         "id,workload,x,y\nt1,5,1,2\n",
-        error="tasks.csv: gives places by x and y, but agents.csv by latitude and longitude; give both alike",
+        error="tasks.csv: gives places by x and y, but agents.csv by latitude and longitude; use the same in both",
     ),
     Case(
         "swapped degrees",
         "id,ability,lat,lon\na,1,147.1,8.5\n",
-        error="agents.csv: line 2: latitude 147.1 and longitude 8.5 are no place on earth;"
-        " are they swapped, or x and y?",
+        error="agents.csv: line 2: latitude 147.1 and longitude 8.5 are not on earth; swapped, or x and y?",
     ),
     Case(
         "east as a latitude",
@@ -646,7 +645,7 @@ DISTANCES = [
     Case(
         "no distances",
         distances="foo,bar\n1,2\n",
-        error="distances.csv: is no table of distances;"
+        error="distances.csv: is not a table of distances;"
         " it needs the columns from, to and distance, or a column for each id",
     ),
 ]
@@ -698,7 +697,7 @@ WORKBOOKS = [
         "merged abilities",
         [["id", "ability"], ["d1", 4], ["d2", None]],
         merged=("B2:B3",),
-        error="agents.xlsx: row 2, column 'ability': is merged: each or all together? Unmerge the cells",
+        error="agents.xlsx: row 2, column 'ability': is merged: one value for each or for all? Unmerge the cells",
     ),
     Case(
         "yes and no as values",
@@ -709,13 +708,13 @@ WORKBOOKS = [
         "a number that became a date",
         [["id", "ability"], ["d1", datetime(2026, 5, 1)]],
         error="agents.xlsx: row 2, column 'ability': is a date (2026-05-01 00:00:00);"
-        " write a number, in a cell that is formatted as one",
+        " write a number, in a cell formatted as a number",
     ),
 ]
 
 PERCENT = (
-    "is in percent, but of which energy? Add a column such as 'Battery capacity [Wh]', or name one with the energy "
-    "itself by --map battery=...; where consumption is in percent, too, give --units energy=%"
+    "is in percent, but the capacity is unknown; add a column such as 'Battery capacity [Wh]', or name one "
+    "with the energy by --map battery=...; if consumption is in percent, too, give --units energy=%"
 )
 
 ENERGIES = [
@@ -740,7 +739,7 @@ ENERGIES = [
         "id,ability,battery [%],battery capacity [Wh]\na,1,80,500\nb,1,,500\n",
         fields={"battery": [400, INF], "units.energy": "Wh"},
         lines=(
-            "agents.csv: battery [%] is taken of battery capacity [Wh]",
+            "agents.csv: battery [%] is a percentage of battery capacity [Wh]",
             "agents.csv: battery capacity [Wh] -> capacity of the battery",
         ),
     ),
@@ -791,7 +790,7 @@ ENERGIES = [
         "bases in a plane among places on earth",
         "id,ability,lat,lon\na,1,0,0\n",
         bases="Base,x,y\nNorth,0,2\n",
-        error="bases.csv: gives places by x and y, but agents.csv by latitude and longitude; give both alike",
+        error="bases.csv: gives places by x and y, but agents.csv by latitude and longitude; use the same in both",
     ),
 ]
 

@@ -1,1 +1,1 @@
-"""Tables as people keep them, in spreadsheets and data frames, to the fields of an instance."""
+"""Import of instances from spreadsheets and data frames with arbitrary column names and units."""

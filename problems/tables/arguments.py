@@ -1,4 +1,4 @@
-"""The rows of agents and tasks to the arguments of an instance."""
+"""Conversion of rows of agents and tasks to arguments of `Instance`."""
 
 from collections.abc import Sequence
 from typing import TypedDict
@@ -19,7 +19,7 @@ from alloc.problems.vocabulary import IDLE
 
 
 class Arguments(TypedDict, total=False):
-    """What an instance is made of; see `Instance`."""
+    """Arguments of `Instance`."""
 
     name: str
     ability: FloatArray
@@ -46,18 +46,18 @@ class Arguments(TypedDict, total=False):
 
 
 def ids_of(records: Records, letter: str) -> list[str]:
-    """Return the ids of the rows, numbers behind a letter where the table has none."""
+    """Return the ids of the rows; by default, a letter and a number."""
     count = len(records.table.rows)
     return records.ids if records.ids is not None else [f"{letter}{number}" for number in range(1, count + 1)]
 
 
 def arguments_of(first: Records, second: Records, bases: Records | None, common: Conversion) -> Arguments:
-    """Return the arguments of an instance, but for what concerns agents and tasks together.
+    """Return the arguments of an instance, except those about both agents and tasks.
 
     Raises
     ------
     InputError
-        If an agent names a task that there is not.
+        If an agent refers to an unknown task.
     """
     task_ids = ids_of(second, "t")
     skills_at = separators([*_cells(first, "skills"), *_cells(second, "needs")])
@@ -100,7 +100,7 @@ def _scaled(records: Records, name: str, common: Conversion) -> FloatArray:
 
 
 def _limit(records: Records, name: str, common: Conversion) -> FloatArray | None:
-    """Return a field in which an empty cell means that there is no limit."""
+    """Return a field in which empty cells mean no limit."""
     if name not in records.numbers:
         return None
     values = _scaled(records, name, common)
@@ -112,12 +112,12 @@ def _positions(records: Records, common: Conversion) -> FloatArray | None:
     if place is None or records.geographic:
         return place
     source, factors = records.table.source, common.factors
-    first = factors.get((source, "x"), 1.0)  # a height without unit is in that of the others
+    first = factors.get((source, "x"), 1.0)  # heights without a unit have that of x
     return place * [factors.get((source, axis), first) for axis in "xyz"]
 
 
 def _alike(names: list[str], spellings: dict[str, str]) -> list[str]:
-    """Return skills in the letters in which they were first written."""
+    """Return skills in the spelling of their first occurrence."""
     return [spellings.setdefault(name.casefold(), name) for name in names]
 
 
@@ -139,12 +139,12 @@ def _starts(records: Records, task_ids: list[str]) -> IntArray | None:
 
 
 def _allowed(records: Records, task_ids: list[str]) -> list[list[int] | None] | None:
-    """Return the tasks of each agent; an id may itself hold what separates the others."""
+    """Return the tasks of each agent; ids may themselves contain separators."""
     if "tasks" not in records.match.columns:
         return None
     index = {name: number for number, name in enumerate(task_ids)}
     cells = records.match.cells("tasks")
-    marks = separators(cells)[:1]  # the other marks may be part of an id
+    marks = separators(cells)[:1]  # other separators may be part of an id
     allowed: list[list[int] | None] = []
     for row, cell in enumerate(cells):
         names = [as_name(cell)] if as_name(cell) in index else [as_name(name) for name in names_in(cell, marks)]

@@ -1,4 +1,4 @@
-"""Batteries in percent: of a capacity in another column, or of nothing that is known."""
+"""Conversion of batteries in percent, by the capacity in another column."""
 
 import numpy as np
 
@@ -10,29 +10,29 @@ from alloc.problems.tables.matching import Match
 from alloc.problems.tables.numeric import Numbers
 
 ENERGIES = ("energy", "charge")
-"""Kinds of units of capacities."""
+"""Kinds of units of battery capacities."""
 
 
 def charged(
     match: Match, numbers: dict[str, FloatArray], found: list[Found], decimal: Mark | None, *, is_percent: bool
 ) -> str | None:
-    """Turn batteries in percent into energy, by the capacity in a column that is no other field; return what was done.
+    """Convert batteries in percent to energy, by the capacity in an otherwise unused column; return a remark.
 
     Parameters
     ----------
     match : Match
     numbers : dict of str to ndarray
-        By field; that of the battery is replaced.
+        Numbers by field; those of the battery are replaced.
     found : list of Found
-        The units of the columns; that of the battery is replaced.
+        Units of the columns; that of the battery is replaced.
     decimal : {",", "."}, optional
     is_percent : bool
-        Whether the user says that all energies are in percent.
+        Whether the user has specified that all energies are in percent.
 
     Raises
     ------
     InputError
-        If nothing says of what the percentages are.
+        If the capacity is unknown.
     """
     place = next(
         (number for number, one in enumerate(found) if one.field == "battery" and _is_share(one.measure)), None
@@ -48,8 +48,8 @@ def charged(
     ]
     if len(capacities) != 1:
         raise table.error(
-            "is in percent, but of which energy? Add a column such as 'Battery capacity [Wh]', or name one with the "
-            "energy itself by --map battery=...; where consumption is in percent, too, give --units energy=%",
+            "is in percent, but the capacity is unknown; add a column such as 'Battery capacity [Wh]', or name one "
+            "with the energy by --map battery=...; if consumption is in percent, too, give --units energy=%",
             column=column,
         )
     (capacity,) = capacities
@@ -59,7 +59,7 @@ def charged(
     name = table.headers[capacity].text
     match.columns["capacity of the battery"] = capacity
     found[place] = Found(table.source, name, "battery", measure)
-    return f"{table.headers[column].text} is taken of {name}"
+    return f"{table.headers[column].text} is a percentage of {name}"
 
 
 def _is_share(measure: Measure | None) -> bool:

@@ -1,4 +1,4 @@
-"""One unit for each quantity, out of the units of all columns."""
+"""Conversion of the units of all columns to one unit per quantity."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields
@@ -20,17 +20,17 @@ DIMENSIONS = {
     "workload": ("work", ""),
     "speed": ("distance", "time"),
 }
-"""What the unit of each field measures; the field that comes first decides on the unit of all."""
+"""Quantities in the unit of each field; the first field with a unit determines the common one."""
 
 PLANE = ("x", "y")
 DEFAULT_TIME = "h"
 FITTING = {"distance": ("distance",), "time": ("time",), "energy": ("energy", "charge", "share", "mass", "volume", "")}
-"""Kinds of units that may measure a quantity; work may be measured by any."""
+"""Kinds of units that fit a quantity; work may have any unit."""
 
 
 @dataclass(frozen=True)
 class Found:
-    """The unit of one column: its table and header for messages, its field, the unit if it has one."""
+    """The unit of a column: table and header, for messages, field, and the unit, if any."""
 
     source: str
     header: str
@@ -40,15 +40,15 @@ class Found:
 
 @dataclass(frozen=True)
 class Conversion:
-    """The units of an instance, and what each column's numbers are multiplied by.
+    """Units of an instance, and the factor of each column.
 
     Attributes
     ----------
     units : Units
     factors : dict of (str, str) to float
-        By source and field.
+        Factors by source and field.
     words : dict of (str, str) to str
-        The same for people.
+        Descriptions of the factors.
     """
 
     units: Units
@@ -62,16 +62,16 @@ def conversion(found: list[Found], given: Units, *, geographic: bool) -> Convers
     Parameters
     ----------
     found : list of Found
-        Altitudes of geographic places are none of them: those are in metres.
+        Units of the columns, without altitudes of geographic places, which are in metres.
     given : Units
-        Those that the user names; they come before all others.
+        Units specified by the user, which take precedence.
     geographic : bool
-        Whether distances are along the surface of the earth, in km unless something else is said.
+        Whether distances are along the surface of the earth, by default in km.
 
     Raises
     ------
     InputError
-        If units do not fit together, or nothing says in which unit places are.
+        If units are incompatible, or the unit of places is unknown.
     """
     labels: dict[str, str] = {}
     for quantity in ("time", "distance", "energy", "work"):
@@ -94,7 +94,7 @@ def conversion(found: list[Found], given: Units, *, geographic: bool) -> Convers
 
 
 def _parts(one: Found) -> Iterator[tuple[str, str]]:
-    """Yield the quantities of a column and its labels of them."""
+    """Yield the quantities in the unit of a column, and their labels."""
     if one.measure is not None:
         top, bottom = DIMENSIONS[one.field]
         yield top, one.measure.top
@@ -103,7 +103,7 @@ def _parts(one: Found) -> Iterator[tuple[str, str]]:
 
 
 def _label(quantity: str, found: list[Found], *, geographic: bool) -> str:
-    """Return the unit that the columns give a quantity."""
+    """Return the unit of a quantity according to the columns."""
     order = list(DIMENSIONS)
     labels = [
         (one.field, label)
@@ -111,7 +111,7 @@ def _label(quantity: str, found: list[Found], *, geographic: bool) -> str:
         for name, label in _parts(one)
         if name == quantity
     ]
-    if quantity == "time":  # a speed does not say what the time of abilities is
+    if quantity == "time":  # the unit of speeds does not determine the time unit of abilities
         labels = [(field, DEFAULT_TIME if field == "speed" else label) for field, label in labels]
     if quantity == "distance" and geographic:
         return next((label for field, label in labels if field != "speed" and label in METRES), "km")
@@ -129,7 +129,7 @@ def _label(quantity: str, found: list[Found], *, geographic: bool) -> str:
 
 
 def _factor(one: Found, labels: Mapping[str, str]) -> float:
-    """Return what the numbers of a column are multiplied by."""
+    """Return the factor of a column."""
     assert one.measure is not None
     factor = one.measure.factor
     top, bottom = DIMENSIONS[one.field]
@@ -149,8 +149,7 @@ def _proportion(one: Found, quantity: str, label: str, labels: Mapping[str, str]
     found = proportion(label, labels[quantity])
     if found is None:
         raise InputError(
-            f"is in {label}, but {quantity} elsewhere in {labels[quantity]}, and one cannot be turned into the other; "
-            "use one unit",
+            f"is in {label}, but {quantity} elsewhere in {labels[quantity]}, which cannot be converted; use one unit",
             f"column {one.header!r}",
             one.source,
         )

@@ -1,4 +1,4 @@
-"""Cells as they stand, from a file, a data frame or Python's own lists and dicts."""
+"""Grids of cells, from files, data frames, lists and dicts."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -11,28 +11,28 @@ from alloc.problems.arguments import shown
 from alloc.problems.errors import InputError
 
 Cell = object
-"""None, a text without blanks around it, a number, a boolean, a date or a list."""
+"""None, a stripped text, a number, a boolean, a date or a list."""
 
 
 @dataclass(frozen=True)
 class Grid:
-    """Rows of cells, with what only the reader of the file knows of them.
+    """Rows of cells, with information from the reader of the file.
 
     Attributes
     ----------
     source : str
-        The file, or the argument.
+        Name of the file or argument.
     rows : list of list of object
     places : list of str
-        What messages call each row, such as ``line 3``.
+        Name of each row in messages, such as ``line 3``.
     has_header : bool
-        Whether the first row is known to name the columns; else it is looked for.
+        Whether the first row is known to be the header; otherwise the header is searched for.
     decimal_point : bool
-        Whether a point can only be a decimal one.
+        Whether a point is always a decimal point.
     merged : frozenset of (int, int)
-        Row and column of cells that share one value with those above or below.
+        Row and column of merged cells.
     notes : tuple of str
-        What the reader noticed.
+        Remarks of the reader.
     """
 
     source: str
@@ -45,7 +45,7 @@ class Grid:
 
 
 class Frame(Protocol):
-    """What is needed of a data frame of pandas, or of another library that is like it."""
+    """Required interface of a data frame of pandas or a similar library."""
 
     columns: Iterable[object]
 
@@ -58,7 +58,7 @@ def grid_of(given: object, source: str) -> Grid:
     Raises
     ------
     InputError
-        If it is none of them, or its columns are of unequal length.
+        If it is none of these, or its columns have unequal lengths.
     """
     if isinstance(given, Grid):
         return given
@@ -97,7 +97,7 @@ def _is_frame(given: object) -> TypeGuard[Frame]:
 
 
 def _index(frame: Frame) -> dict[object, Sequence[object]]:
-    """Return the index of a data frame as columns, where it has a name or holds texts."""
+    """Return the index of a data frame as columns, if it has a name or contains texts."""
     index = getattr(frame, "index", None)
     names = getattr(index, "names", None)
     if index is None or names is None or len(names) != 1:
@@ -108,7 +108,7 @@ def _index(frame: Frame) -> dict[object, Sequence[object]]:
 
 
 def clean(cell: object) -> Cell:
-    """Return a cell without numpy's types, blanks around it, and the many ways of saying that it is empty."""
+    """Return a cell with numpy types converted, texts stripped, and missing values as None."""
     if isinstance(cell, np.generic):
         cell = cell.item()
     if isinstance(cell, np.ndarray):
@@ -121,7 +121,7 @@ def clean(cell: object) -> Cell:
 
 
 def as_text(cell: Cell) -> str:
-    """Return a cell as a name: whole numbers without a fraction, as spreadsheets show them."""
+    """Return a cell as text, with integers without a fraction, as spreadsheets show them."""
     if cell is None:
         return ""
     if isinstance(cell, float) and cell.is_integer():
@@ -130,10 +130,10 @@ def as_text(cell: Cell) -> str:
 
 
 def as_name(cell: Cell) -> str:
-    """Return a cell as the name of an agent, a task or a skill, in one line with single blanks."""
+    """Return a cell as the name of an agent, a task or a skill, with whitespace collapsed to single spaces."""
     return " ".join(as_text(cell).split())
 
 
 def is_real(cell: Cell) -> TypeGuard[float]:
-    """Whether a cell is a number by its type."""
+    """Return whether the type of a cell is a number."""
     return isinstance(cell, Real) and not isinstance(cell, bool)

@@ -1,4 +1,4 @@
-"""Where a table begins and ends: its header, a row of units, totals, footnotes and empty rows."""
+"""Detection of the layout of a table: header, row of units, totals, footnotes and empty rows."""
 
 import re
 from dataclasses import dataclass, field
@@ -13,27 +13,27 @@ from alloc.problems.tables.language.measures import measure_of
 from alloc.problems.tables.language.synonyms import TOTALS
 
 SEARCHED = 20
-"""Rows among which the header is looked for."""
+"""Number of rows among which the header is searched for."""
 
 
 @dataclass(frozen=True)
 class Table:
-    """Rows below a header.
+    """A table: headers and rows.
 
     Attributes
     ----------
     source : str
     headers : list of Header
     rows : list of list of object
-        As many cells as there are headers.
+        Rows with one cell per header.
     places : list of str
-        What messages call each row.
+        Name of each row in messages.
     decimal_point : bool
-        Whether a point can only be a decimal one.
+        Whether a point is always a decimal point.
     merged : frozenset of (int, int)
-        Row and column of cells that share one value.
+        Row and column of merged cells.
     notes : list of str
-        What was left out, and why.
+        Remarks on what was left out.
     """
 
     source: str
@@ -52,19 +52,19 @@ class Table:
 
 
 def table_of(grid: Grid, kind: Kind, mapped: frozenset[str] = frozenset()) -> Table:
-    """Return the table that a grid holds.
+    """Return the table in a grid.
 
     Parameters
     ----------
     grid : Grid
     kind : {"agents", "tasks", "distances"}
     mapped : frozenset of str
-        Names of columns that the user has named.
+        Names of columns specified by the user.
 
     Raises
     ------
     InputError
-        If it holds no header, no rows, or a row that is longer than the header.
+        If it has no header, no rows, or a row that is longer than the header.
     """
     filled = [row for row, cells in enumerate(grid.rows) if any(cell is not None for cell in cells)]
     if not filled:
@@ -103,7 +103,7 @@ def table_of(grid: Grid, kind: Kind, mapped: frozenset[str] = frozenset()) -> Ta
 
 
 def _header_row(grid: Grid, rows: list[int], kind: Kind, mapped: frozenset[str]) -> int:
-    """Return the row without numbers in which most cells are names of known columns, the first of the fullest."""
+    """Return the row without numbers that has most names of known columns; of equals, the first fullest one."""
     scores: dict[int, tuple[int, int]] = {}
     for row in rows:
         texts = _names(grid, row)
@@ -122,7 +122,7 @@ def _header_row(grid: Grid, rows: list[int], kind: Kind, mapped: frozenset[str])
 
 
 def _names(grid: Grid, row: int) -> list[str]:
-    """Return the names of columns in a row; where it has none, or a unit, with those of the row above."""
+    """Return the names of columns in a row, combined with the row above for cells that are empty or units."""
     texts = [as_name(cell) for cell in grid.rows[row]]
     above = [as_name(cell) for cell in grid.rows[row - 1]] if row else []
     if sum(map(bool, above)) < 2 or any(map(_is_number, grid.rows[row - 1])):
@@ -131,14 +131,14 @@ def _names(grid: Grid, row: int) -> list[str]:
 
 
 def _joined(upper: str, lower: str) -> str:
-    """Return the name of a column out of two rows: the lower cell, or the upper one with its unit."""
+    """Return the name of a column from two header rows: the lower cell, or the upper one with its unit."""
     if upper and lower and upper != lower and measure_of(lower.strip("[]()")) is not None:
         return upper if _ends_in(upper, lower) else f"{upper} [{lower.strip('[]()')}]"
     return lower or upper
 
 
 def _ends_in(name: str, unit: str) -> bool:
-    """Whether the name of a column has the unit already that stands in the cell below it."""
+    """Return whether the name of a column already ends with the unit in the cell below it."""
     return measure_of(re.split(r"[\s\[(]", name.rstrip(")] "))[-1]) == measure_of(unit.strip("[]() "))
 
 
@@ -147,7 +147,7 @@ def _is_number(cell: Cell) -> bool:
 
 
 def _are_units(cells: list[Cell]) -> bool:
-    """Whether a row holds nothing but units, in square brackets or not."""
+    """Return whether a row contains only units, with or without brackets."""
     texts = [cell for cell in cells if isinstance(cell, str) and not is_absent(cell)]
     if not texts or any(cell is not None and not isinstance(cell, str) for cell in cells):
         return False
@@ -163,7 +163,7 @@ def _with_unit(header: Header, unit: Cell) -> Header:
 
 
 def _body(grid: Grid, body: list[int], header: list[str], notes: list[str]) -> list[int]:
-    """Return the rows without repeated headers, and without totals and footnotes at the end; `notes` says which."""
+    """Return the rows without repeated headers, and without totals and footnotes at the end; add them to `notes`."""
     repeated = [row for row in body if [as_name(cell) for cell in grid.rows[row]] == header]
     notes += [f"{grid.places[row]} repeats the names of the columns and is left out" for row in repeated]
     body = [row for row in body if row not in set(repeated)]

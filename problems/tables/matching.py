@@ -1,4 +1,4 @@
-"""Which column holds which field: named by the user, or guessed by its header where only one reading fits."""
+"""Matching of columns with fields, specified by the user or recognised by an unambiguous header."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
@@ -17,21 +17,21 @@ WORDS = {
     "energy_per_distance": "energy per distance",
     "start_task": "start task",
 }
-"""What messages call a field whose name is no plain English."""
+"""Names of fields in messages, if they differ from the field."""
 
 REMARKS = {"priority": " (larger is more urgent)"}
-"""What a line about a column adds, because people have it both ways."""
+"""Additional remarks on columns whose convention varies."""
 
 TEXTS = ("id", "start_task", "tasks", "skills", "needs", "returns", "gps", "lonlat", "position", "from", "to")
-"""Fields that no constant stands for."""
+"""Fields that cannot be given as a constant."""
 
 FAMILIES = (("x", "y"), ("lat", "lon"), ("gps",), ("lonlat",), ("position",))
-"""The ways of giving a place."""
+"""Alternative sets of columns for places."""
 
 
 @dataclass
 class Match:
-    """The columns of a table by the fields that they hold.
+    """Columns of a table by field.
 
     Attributes
     ----------
@@ -39,7 +39,7 @@ class Match:
     kind : {"agents", "tasks", "distances"}
     columns : dict of str to int
     constants : dict of str to float
-        Values that hold for all rows, as ``ability=1`` gives them.
+        Values for all rows, as given by ``ability=1``.
     """
 
     table: Table
@@ -52,7 +52,7 @@ class Match:
         return [row[self.columns[name]] for row in self.table.rows]
 
     def guesses(self, conversions: Mapping[str, str]) -> list[str]:
-        """Return a line for each column; `conversions` says what became of the units of some fields."""
+        """Return a line for each column with its interpretation; `conversions` describes conversions of units."""
         fields = {column: name for name, column in self.columns.items()}
         lines = [f"{name} = {value:g} for all" for name, value in self.constants.items()]
         for column, header in enumerate(self.table.headers):
@@ -66,19 +66,19 @@ class Match:
 
 
 def match_columns(table: Table, kind: Kind, wanted: Mapping[str, str]) -> Match:
-    """Return which columns of a table hold which fields.
+    """Return the columns of a table by field.
 
     Parameters
     ----------
     table : Table
     kind : {"agents", "tasks", "distances"}
     wanted : dict of str to str
-        Columns that the user names, by field.
+        Columns specified by the user, by field.
 
     Raises
     ------
     InputError
-        If a column or a field can be read in two ways.
+        If a column or a field is ambiguous.
     """
     match = Match(table, kind, {})
     for name, text in wanted.items():
@@ -100,7 +100,7 @@ def match_columns(table: Table, kind: Kind, wanted: Mapping[str, str]) -> Match:
 
 
 def column_named(table: Table, text: str) -> int | None:
-    """Return the column with this name, in other letters or without its unit if need be; None where there is none."""
+    """Return the column with this name, ignoring case or without its unit if necessary; None if there is none."""
     for form in (str, str.strip, str.casefold, plain):
         found = [column for column, header in enumerate(table.headers) if form(header.text) == form(text)]
         if len(found) > 1:
@@ -128,7 +128,7 @@ def _take(match: Match, name: str, text: str) -> None:
 
 
 def _readings(match: Match, column: int) -> Iterable[str]:
-    """Return the field that a column may be, if any."""
+    """Return the fields that a column may be, if any."""
     header = match.table.headers[column]
     given = {*match.columns, *match.constants}
     readings = [name for name in header.ranks if name not in given]
@@ -137,7 +137,7 @@ def _readings(match: Match, column: int) -> Iterable[str]:
     if len(readings) > 1:
         what = " or the ".join(WORDS.get(name, name) for name in readings)
         choice = " or ".join(f"--map {name}={_quoted(header.text)}" for name in readings)
-        raise match.table.error(f"may be the {what}; say which by {choice}", column=column)
+        raise match.table.error(f"may be the {what}; specify it by {choice}", column=column)
     return readings
 
 
@@ -145,7 +145,7 @@ def _ambiguous(table: Table, name: str, columns: list[int]) -> InputError:
     texts = [table.headers[column].text for column in columns]
     what = " and ".join(map(repr, texts))
     return table.error(
-        f"columns {what} may each be the {WORDS.get(name, name)}; say which, as by --map {name}={_quoted(texts[0])}"
+        f"columns {what} may each be the {WORDS.get(name, name)}; specify one, as by --map {name}={_quoted(texts[0])}"
         if len(set(texts)) == len(texts)
         else f"there are {len(texts)} columns {texts[0]!r}; rename all but one"
     )
@@ -156,7 +156,7 @@ def _quoted(text: str) -> str:
 
 
 def _refuse_unclear_places(match: Match) -> None:
-    """Refuse a column of pairs of numbers that may be degrees or not, where no other column gives places."""
+    """Raise an error for a column of pairs that may or may not be degrees, if no other column gives places."""
     if any(name in match.columns or name in match.constants for family in FAMILIES for name in family):
         return
     for column, header in enumerate(match.table.headers):
@@ -164,13 +164,13 @@ def _refuse_unclear_places(match: Match) -> None:
         if plain(header.text) in UNCLEAR_PLACES and coordinates(cell) is not None:
             text = _quoted(header.text)
             raise match.table.error(
-                f"may be latitude and longitude, or x and y; say which by --map gps={text} or --map position={text}",
+                f"may be latitude and longitude, or x and y; specify it by --map gps={text} or --map position={text}",
                 column=column,
             )
 
 
 def _choose_place(match: Match, wanted: Mapping[str, str]) -> None:
-    """Keep the way of giving places that the user names, or the only one."""
+    """Keep the set of columns for places that the user specified, or the only one."""
     held = {**match.columns, **match.constants}
     given = [family for family in FAMILIES if any(name in held for name in family)]
     named = [family for family in given if any(name in wanted for name in family)]
@@ -180,7 +180,7 @@ def _choose_place(match: Match, wanted: Mapping[str, str]) -> None:
         given = named
     if len(given) > 1:
         what = " and ".join(repr(_called(match, name)) for family in given for name in family if name in held)
-        raise match.table.error(f"columns {what} give places in two ways; say which, as by --map {given[0][0]}=...")
+        raise match.table.error(f"columns {what} give places in two ways; specify one, as by --map {given[0][0]}=...")
     for family in given:
         for name in family:
             if name not in held:
@@ -189,5 +189,5 @@ def _choose_place(match: Match, wanted: Mapping[str, str]) -> None:
 
 
 def _called(match: Match, name: str) -> str:
-    """Return the header of the column of a field, or the field that a constant stands for."""
+    """Return the header of the column of a field, or the name of a field that is constant."""
     return match.table.headers[match.columns[name]].text if name in match.columns else name

@@ -1,4 +1,4 @@
-"""Columns of numbers, and the units in their headers and cells."""
+"""Parsing of columns of numbers, with units in headers and cells."""
 
 import re
 from collections.abc import Mapping
@@ -17,25 +17,25 @@ from alloc.problems.tables.values import angle
 
 ANGLES = ("lat", "lon")
 OTHER_SIDES = {"lat": "[EWew]", "lon": "[NSns]"}
-"""Marks of the compass that stand for the other angle."""
+"""Compass directions that belong to the other coordinate."""
 
 NO_UNIT = ("priority", "x", "y", "z")
-"""Fields of which a text in brackets that is no known unit is a remark, such as a scale or a projection."""
+"""Fields for which unknown text in brackets is a remark, such as a scale or a projection, not a unit."""
 
 WORK = ("ability", "workload")
-"""Fields whose unit may be any word, and of which a merged cell may hold the sum or each."""
+"""Fields whose unit may be any word, and whose merged cells are ambiguous: the sum, or each value."""
 
 
 class Numbers:
-    """Reads the numbers of a table, in which all show what the decimal mark is.
+    """Parser of the numbers of a table, which determines the decimal mark from all of them.
 
     Parameters
     ----------
     table : Table
     columns : dict of str to int
-        Those that hold numbers, by field.
+        Columns with numbers, by field.
     decimal : {",", "."}, optional
-        The decimal mark, where the user says.
+        The decimal mark, if specified by the user.
     """
 
     def __init__(self, table: Table, columns: Mapping[str, int], decimal: Mark | None) -> None:
@@ -49,12 +49,12 @@ class Numbers:
         Raises
         ------
         InputError
-            If a cell is no number, or may be one of two.
+            If a cell is not a number, or is ambiguous.
         """
         column = self._columns[name]
         if name == "priority" and re.search(FIRST_IS_HIGHEST, self._table.headers[column].text, re.IGNORECASE):
             raise self._table.error(
-                "counts from 1, the most urgent, but here larger is more urgent; turn it round", column=column
+                "counts from 1, the most urgent, but here larger is more urgent; reverse it", column=column
             )
         mark = self._mark(name, column)
         values = np.full(len(self._table.rows), np.nan)
@@ -65,40 +65,40 @@ class Numbers:
             if unit and not np.isnan(value):
                 units.setdefault(unit, row)
             if name in WORK and (row, column) in self._table.merged:
-                raise self._table.error("is merged: each or all together? Unmerge the cells", row, column)
+                raise self._table.error("is merged: one value for each or for all? Unmerge the cells", row, column)
         return values, self._measure(name, column, units)
 
     def _mark(self, name: str, column: int) -> Mark:
-        """Return the decimal mark of a column: by its own numbers, else by those of the whole table."""
+        """Return the decimal mark of a column, by its own numbers, or else by those of the whole table."""
         if self._decimal is not None:
             return self._decimal
         digits = self._digits[column]
         own = decimal_marks(digits)
         unclear = [one for one in digits if mark_of(one).startswith("?")]
         if len(own) == 2:
-            raise self._table.error("has decimal commas and decimal points; write all alike", column=column)
+            raise self._table.error("has decimal commas and decimal points; use one of them", column=column)
         if own or not unclear:
             return next(iter(own), ".")
         if name in ANGLES:
-            return "," if "," in unclear[0] else "."  # thousands of degrees there are none
+            return "," if "," in unclear[0] else "."  # degrees are never in the thousands
         if len(self._shown) == 1:
             return next(iter(self._shown))
-        has_whole = any(mark_of(one) == "" for one in digits)  # then those with three decimals may be thousands
+        has_whole = any(mark_of(one) == "" for one in digits)  # then three digits after a mark may be thousands
         if self._table.decimal_point and not has_whole and not any("," in one for one in unclear):
             return "."
         raise self._unclear(unclear, column)
 
     def _unclear(self, unclear: list[str], column: int) -> InputError:
-        """Return the error of a number that may be one of two."""
+        """Return the error for an ambiguous number."""
         row = next(row for row, cells in enumerate(self._table.rows) if str(cells[column]).startswith(unclear[0]))
         as_decimal, as_group = unclear[0].replace(",", "."), unclear[0].replace(",", "").replace(".", "")
         choice = "comma or --decimal point" if "," in unclear[0] else "point or --decimal comma"
         return self._table.error(
-            f"{unclear[0]!r} may be {as_decimal} or {as_group}; say which by --decimal {choice}", row, column
+            f"{unclear[0]!r} may be {as_decimal} or {as_group}; specify it by --decimal {choice}", row, column
         )
 
     def _number(self, name: str, cell: Cell, mark: Mark, row: int) -> tuple[float, str]:
-        """Return the value of a cell, and the unit that stands behind it."""
+        """Return the value of a cell, and the unit after it."""
         if cell is None or (isinstance(cell, str) and is_absent(cell)):
             return np.nan, ""
         if is_real(cell):
@@ -106,9 +106,9 @@ class Numbers:
         column = self._columns[name]
         if not isinstance(cell, str):
             what = f"is a date ({cell})" if hasattr(cell, "isoformat") else f"must be a number, got {shown(cell)}"
-            raise self._table.error(f"{what}; write a number, in a cell that is formatted as one", row, column)
+            raise self._table.error(f"{what}; write a number, in a cell formatted as a number", row, column)
         if cell.startswith("#"):
-            raise self._table.error(f"holds the error {cell!r} of a formula; mend it", row, column)
+            raise self._table.error(f"contains the error {cell!r} of a formula; correct it", row, column)
         if name == "priority" and cell.casefold() in LEVELS:
             return LEVELS[cell.casefold()], ""
         parts = split_number(cell)
@@ -118,7 +118,7 @@ class Numbers:
         if degrees is not None:
             return degrees, ""
         header = self._table.headers[column].text
-        guess = "" if header.casefold() == name else f"; if this is not the {name}, say which is by --map {name}=COLUMN"
+        guess = "" if header.casefold() == name else f"; if this is not the {name}, specify it by --map {name}=COLUMN"
         raise self._table.error(f"must be a number, got {shown(cell)}{guess}", row, column)
 
     def _value(self, digits: str, mark: Mark, row: int, column: int) -> float:
@@ -134,7 +134,7 @@ class Numbers:
         return measure_of(text) is not None or (name in WORK and text.replace("/", "").isalpha())
 
     def _measure(self, name: str, column: int, units: Mapping[str, int]) -> Measure | None:
-        """Return the unit of a column, which its header and all its cells agree on."""
+        """Return the unit of a column, after checking that its header and cells agree."""
         if name in ANGLES:
             return None
         header = self._table.headers[column]
@@ -144,19 +144,19 @@ class Numbers:
         for unit, row in units.items():
             found = measure_of(unit) or rate_of(unit)
             if measure is not None and found != measure:
-                raise self._table.error(f"is in {unit}, others are in {measure}; write all in one unit", row, column)
+                raise self._table.error(f"is in {unit}, others are in {measure}; use one unit", row, column)
             measure = found
         return measure
 
 
 def _digits(table: Table, column: int) -> list[str]:
-    """Return the digits of a column's texts that are numbers."""
+    """Return the digits of those texts in a column that are numbers."""
     texts = [cell for cell in (row[column] for row in table.rows) if isinstance(cell, str)]
     return [parts[0] for parts in map(split_number, texts) if parts is not None]
 
 
 def require_numbers(table: Table, column: int | None, name: str, values: FloatArray) -> None:
-    """Raise `InputError` where a number that every row must have is absent."""
+    """Raise `InputError` if a required number is missing in a row."""
     absent = np.isnan(values)
     if absent.any():
         raise table.error(f"has no {name}; fill it in, or leave the row out", int(np.argmax(absent)), column)

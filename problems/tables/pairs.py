@@ -1,4 +1,4 @@
-"""Tables of distances: a row for each pair, or a matrix."""
+"""Tables of distances, with a row per pair or as a matrix."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,18 +19,18 @@ NO_WAY = ("inf", "infinity", "\u221e")
 
 @dataclass
 class Pairs:
-    """Distances by pairs of ids.
+    """Distances between pairs of ids.
 
     Attributes
     ----------
     source : str
     rows : list of (str, str, float)
     places : list of str
-        Where each stands.
+        Place of each row, for messages.
     found : list of Found
-        Their unit.
+        Unit of the distances.
     closed : bool
-        Whether some pair is marked as one that nobody can go.
+        Whether a pair is marked as unreachable.
     guesses, notes : list of str
     """
 
@@ -46,12 +46,12 @@ class Pairs:
 def pairs_of(
     grid: Grid, agents: Sequence[str], tasks: Sequence[str], wanted: dict[str, str], decimal: Mark | None
 ) -> Pairs:
-    """Return the distances in a table with the columns from, to and distance, or a matrix between ids.
+    """Return the distances in a table with the columns from, to and distance, or in a matrix between ids.
 
     Raises
     ------
     InputError
-        If it is neither, or a cell is no distance.
+        If it is neither, or a cell is not a distance.
     """
     table = table_of(grid, "distances", frozenset([*agents, *tasks]))
     match = match_columns(table, "distances", wanted)
@@ -63,7 +63,7 @@ def pairs_of(
         pairs = _matrix(table, between, decimal)
     else:
         raise InputError(
-            "is no table of distances; it needs the columns from, to and distance, or a column for each id",
+            "is not a table of distances; it needs the columns from, to and distance, or a column for each id",
             source=table.source,
         )
     _leave_out(pairs, set(agents) - set(tasks), set(agents) & set(tasks))
@@ -86,7 +86,7 @@ def _listed(match: Match, decimal: Mark | None) -> Pairs:
 
 
 def _matrix(table: Table, between: list[int], decimal: Mark | None) -> Pairs:
-    """Return the distances from the id in the first other column to those that name columns."""
+    """Return the distances from the ids in the first other column to the ids that name columns."""
     names = next((column for column in range(len(table.headers)) if column not in between), None)
     if names is None:
         raise InputError("has no column with the ids of its rows", source=table.source)
@@ -110,14 +110,14 @@ def _matrix(table: Table, between: list[int], decimal: Mark | None) -> Pairs:
 
 
 def _is_closed(cell: Cell) -> bool:
-    """Whether a cell says that there is no way, rather than nothing."""
+    """Return whether a cell marks a pair as unreachable, instead of being empty."""
     return as_name(cell).casefold() in NO_WAY
 
 
 def _leave_out(pairs: Pairs, agents: set[str], unclear: set[str]) -> None:
-    """Leave out what lies between two agents, or between an id and itself, as full matrices have it.
+    """Drop distances between two agents, or from an id to itself, as in full matrices.
 
-    Ids that are `unclear`, those of an agent and of a task, are left for the table of distances to refuse.
+    `unclear` ids, which belong to both an agent and a task, are kept, and rejected later by the table of distances.
     """
     kept = [
         number

@@ -1,4 +1,4 @@
-"""Tables of agents, tasks and distances to the arguments of an instance."""
+"""Conversion of tables of agents, tasks and distances to arguments of an instance."""
 
 import logging
 import re
@@ -27,7 +27,7 @@ ROW = re.compile(r"^(agents|tasks|bases|distances\.rows)\[(\d+)\]")
 
 
 class TableOptions(TypedDict, total=False):
-    """What `read_tables` takes besides tables."""
+    """Options of `read_tables`."""
 
     columns: Mapping[str, str] | None
     units: Units | None
@@ -40,28 +40,28 @@ class TableOptions(TypedDict, total=False):
 
 @dataclass(frozen=True)
 class Reading:
-    """What tables say.
+    """Arguments of an instance read from tables.
 
     Attributes
     ----------
     arguments : dict
-        Those of an instance.
+        Arguments of an instance.
     places : dict of str to (str, list of str)
-        The source of each table, and what messages call its rows.
+        Source of each table, and names of its rows in messages.
     """
 
     arguments: Arguments
     places: Mapping[str, tuple[str, list[str]]]
 
     def built(self, build: Callable[..., Built]) -> Built:
-        """Return the instance; its errors name the place in the tables."""
+        """Return the instance; errors name the place in the tables."""
         try:
             return build(**self.arguments)
         except InputError as error:
             raise self.located(error) from error
 
     def located(self, error: InputError) -> InputError:
-        """Return an error of the instance with its place in the tables."""
+        """Return an error with its place in the tables."""
         match = ROW.match(error.place)
         if match is None or int(match[2]) >= len(self.places[match[1]][1]):
             return error
@@ -70,7 +70,7 @@ class Reading:
         return InputError(message, rows[int(match[2])], source)
 
     def table(self, pairs: Pairs, common: Conversion, missing: str) -> DistanceTable:
-        """Return the distances between pairs, in the common unit."""
+        """Return the table of distances in the common unit."""
         factor = common.factors.get((pairs.source, "distance"), 1.0)
         rows = [(source, target, distance * factor) for source, target, distance in pairs.rows]
         ids = self.arguments["agent_ids"], self.arguments["task_ids"]
@@ -93,34 +93,35 @@ def read_tables(
     report: Callable[[str], object] | None = None,
     bases: object | None = None,
 ) -> Reading:
-    """Return what tables as people keep them say, by the names of their columns.
+    """Read tables, recognising columns by their names and units.
 
     Parameters
     ----------
     agents, tasks : DataFrame, dict of columns, list of dicts, or Grid
     distances : the same, optional
-        With columns from, to and distance, or as a matrix.
+        Distances, with columns from, to and distance, or as a matrix.
     columns : dict of str to str, optional
-        The column of a field where it cannot be guessed, or a number for all rows, such as ``{"ability": "1"}``;
-        ``agents.id`` and ``tasks.id`` where both tables have it.
+        Column of a field that is not recognised, or a number for all rows, such as ``{"ability": "1"}``;
+        ``agents.id`` and ``tasks.id`` apply to one table only.
     units : Units, optional
-        Those that the headers do not give.
+        Units that are not given in headers.
     decimal : {"point", "comma"}, optional
-        The decimal mark, where the numbers do not show it.
+        The decimal mark, if the numbers leave it open.
     missing : {"metric", "unreachable"}, optional
-        What holds for pairs without a distance; the first where all have places, unless a pair is marked as closed.
+        Treatment of pairs without a distance; by default ``metric`` if all have places and no pair is marked as
+        unreachable.
     name : str
-        Of the instance.
+        Name of the instance.
     report : function, optional
-        Called with a line for each column, on what it was taken for, and for each row that was left out; they are
-        logged where it is None.
+        Called with a line on the interpretation of each column, and on each row that was left out; by default, these
+        are logged.
     bases : the same as `agents`, optional
-        Ids and places to which agents return.
+        Ids and places of the bases to which agents return.
 
     Raises
     ------
     InputError
-        If a table can be read in two ways or in none, in one line with the place and the mend.
+        If a table is ambiguous or cannot be read; the message names the place and the correction.
     """
     if decimal is not None and decimal not in DECIMALS:
         raise InputError(f"must be point or comma, got {decimal!r}", "decimal")
@@ -129,7 +130,7 @@ def read_tables(
     first_grid, second_grid = grid_of(agents, "agents"), grid_of(tasks, "tasks")
     if first_grid.source == second_grid.source:
         raise InputError(
-            "holds agents and tasks at once; name a sheet for each, or two files", source=first_grid.source
+            "cannot be both agents and tasks; name a sheet for each, or two files", source=first_grid.source
         )
     is_percent = units is not None and units.energy == "%"
     first = _records(first_grid, "agents", wanted, mark, is_percent=is_percent)
@@ -173,20 +174,20 @@ def _records(grid: Grid, kind: Kind, wanted: Wanted, mark: Mark | None, *, is_pe
 
 
 def _geographic(placed: Sequence[Records]) -> bool:
-    """Return whether places are latitude and longitude; refuse tables that differ."""
+    """Return whether places are latitude and longitude; raise an error if tables differ."""
     known = [records for records in placed if records.geographic is not None]
     for records in known[1:]:
         if records.geographic != known[0].geographic:
             told = ["latitude and longitude" if one.geographic else "x and y" for one in (known[0], records)]
             raise InputError(
-                f"gives places by {told[1]}, but {known[0].table.source} by {told[0]}; give both alike",
+                f"gives places by {told[1]}, but {known[0].table.source} by {told[0]}; use the same in both",
                 source=records.table.source,
             )
     return bool(known and known[0].geographic)
 
 
 def _missing(pairs: Pairs, first: Records, second: Records) -> str:
-    """Return what holds for pairs without a distance: the metric where all have places and none is closed."""
+    """Return the treatment of pairs without a distance: the metric if all have places and none is unreachable."""
     placed = first.geographic is not None and second.geographic is not None
     return "metric" if placed and not pairs.closed else "unreachable"
 
@@ -199,15 +200,15 @@ def _lines(records: Records, common: Conversion) -> list[str]:
 
 
 def _pair_lines(pairs: Pairs, common: Conversion, missing: str) -> list[str]:
-    rest = "are those between places" if missing == "metric" else "mean that nobody can go there"
-    told = [*pairs.guesses, *pairs.notes, f"{len(pairs.rows)} distances; those left out {rest}"]
+    rest = "are computed from places" if missing == "metric" else "are unreachable"
+    told = [*pairs.guesses, *pairs.notes, f"{len(pairs.rows)} distances; missing ones {rest}"]
     if (pairs.source, "distance") in common.words:
         told.append(f"distances{common.words[pairs.source, 'distance']}")
     return [f"{pairs.source}: {line}" for line in told]
 
 
 def _unplaced(first: Records, second: Records) -> list[str]:
-    """Return a line where one table gives places and the other does not."""
+    """Return a line if one table gives places and the other does not."""
     without = [records for records in (first, second) if records.geographic is None]
     if len(without) != 1 or "start_task" in without[0].match.columns:
         return []

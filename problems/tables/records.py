@@ -1,4 +1,4 @@
-"""One table of agents or tasks, field by field."""
+"""Parsing of a table of agents, tasks or bases into fields."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -33,23 +33,23 @@ EXAMPLES = {
 
 @dataclass
 class Records:
-    """The rows of one table.
+    """Parsed rows of a table.
 
     Attributes
     ----------
     match : Match
     ids : list of str, or None
-        None where there is no column of them.
+        Ids; None without a column of ids.
     numbers : dict of str to ndarray
-        By field, NaN where a cell is empty, in the units of the table.
+        Numbers by field, in the units of the table; NaN for empty cells.
     found : list of Found
-        The units of the columns.
+        Units of the columns.
     geographic : bool or None
-        Whether places are latitude and longitude; None where there are none.
+        Whether places are latitude and longitude; None without places.
     notes : list of str
-        What became of rows without id.
+        Remarks on rows without ids.
     conversions : dict of str to str
-        What became of the units of some fields.
+        Descriptions of conversions of units, by field.
     """
 
     match: Match
@@ -62,11 +62,11 @@ class Records:
 
     @property
     def table(self) -> Table:
-        """The table that the rows are of."""
+        """The original table."""
         return self.match.table
 
     def homes(self, bases: Sequence[str]) -> list[bool | str] | None:
-        """Return the ids of bases to which rows return, or whether they return at all; None without such a column."""
+        """Return the base of each row, or whether it returns at all; None without such a column."""
         if "returns" not in self.match.columns:
             return None
         column = self.match.columns["returns"]
@@ -74,13 +74,13 @@ class Records:
         return [name if name in bases else flag(self.table, row, column) for row, name in enumerate(names)]
 
     def lists(self, name: str, marks: str) -> list[list[str]] | None:
-        """Return the lists of names of a field, None where there is no such column."""
+        """Return the lists of names of a field; None without such a column."""
         if name not in self.match.columns:
             return None
         return [names_in(cell, marks) for cell in self.match.cells(name)]
 
     def positions(self) -> FloatArray | None:
-        """Return places, shape (count, 3), in the order of an instance: longitude before latitude."""
+        """Return positions, shape (count, 3), with longitude before latitude, as in an instance."""
         if self.geographic is None:
             return None
         first, second = ("lon", "lat") if self.geographic else ("x", "y")
@@ -102,8 +102,7 @@ class Records:
         if wrong.any():
             row = int(np.argmax(wrong))
             raise self.table.error(
-                f"latitude {place[row, 1]:g} and longitude {place[row, 0]:g} are no place on earth; are they swapped, "
-                "or x and y?",
+                f"latitude {place[row, 1]:g} and longitude {place[row, 0]:g} are not on earth; swapped, or x and y?",
                 row,
             )
 
@@ -114,13 +113,13 @@ def records_of(match: Match, decimal: Mark | None, *, is_percent: bool = False) 
     Raises
     ------
     InputError
-        If a cell cannot be read, an id is there twice, or what every row must have is absent.
+        If a cell cannot be read, an id is repeated, or a required value is missing.
     """
     table, required = match.table, REQUIRED[match.kind]
     if required is not None and required not in match.columns and required not in match.constants:
         names = ", ".join(repr(header.text) for header in table.headers if header.text)
-        names += f"; say which by --map {EXAMPLES[match.kind]}"
-        raise table.error(f"no column is known as the {required}; the columns are {names}")
+        names += f"; specify it by --map {EXAMPLES[match.kind]}"
+        raise table.error(f"no column is recognised as the {required}; the columns are {names}")
     columns = {name: column for name, column in match.columns.items() if name in NUMERIC}
     reader, numbers, found = Numbers(table, columns, decimal), dict[str, FloatArray](), list[Found]()
     for name, column in columns.items():
@@ -143,7 +142,7 @@ def records_of(match: Match, decimal: Mark | None, *, is_percent: bool = False) 
 
 
 def _west(records: Records) -> None:
-    """Say that longitudes beyond 180 are taken as west."""
+    """Add a note that longitudes above 180 are interpreted as west."""
     if not records.geographic or not (records.numbers["lon"] > HALF_TURN).any():
         return
     east = float(records.numbers["lon"][np.argmax(records.numbers["lon"] > HALF_TURN)])
@@ -155,7 +154,7 @@ def _is_geographic(numbers: dict[str, FloatArray]) -> bool | None:
 
 
 def _metres(records: Records) -> None:
-    """Turn altitudes above places on earth into metres, and let them decide on no unit of distance."""
+    """Convert altitudes of geographic places to metres, and exclude them from the common unit of distance."""
     if not records.geographic:
         return
     for one in [one for one in records.found if one.field == "z"]:
@@ -169,7 +168,7 @@ def _metres(records: Records) -> None:
 
 
 def _combined(match: Match) -> dict[str, FloatArray]:
-    """Return the coordinates of a column that holds all of them."""
+    """Return the coordinates in a single column."""
     name = next((name for name in ("gps", "lonlat", "position") if name in match.columns), None)
     if name is None:
         return {}
@@ -186,7 +185,7 @@ def _combined(match: Match) -> dict[str, FloatArray]:
 
 
 def _unit_of_position(match: Match) -> list[Found]:
-    """Return the unit of x, y and z that one column holds."""
+    """Return the unit of x, y and z in a single column."""
     if "position" not in match.columns:
         return []
     header = match.table.headers[match.columns["position"]]
@@ -194,7 +193,7 @@ def _unit_of_position(match: Match) -> list[Found]:
 
 
 def _ids(match: Match, required: FloatArray | None, notes: list[str]) -> list[str] | None:
-    """Return the ids of the rows; those without get a number, and `notes` says so."""
+    """Return the ids of the rows; rows without an id get one, with a remark in `notes`."""
     table = match.table
     letter = match.kind[0]
     if "id" not in match.columns:
@@ -207,13 +206,13 @@ def _ids(match: Match, required: FloatArray | None, notes: list[str]) -> list[st
     first: dict[str, int] = {}
     for row, name in enumerate(ids):
         if name and name in first:
-            raise table.error(f"{name!r} is the id in {table.places[first[name]]} too; rename one", row, column)
+            raise table.error(f"{name!r} is also the id in {table.places[first[name]]}; rename one", row, column)
         first[name] = row
     for row, name in enumerate(ids):
         if not name:
             ids[row] = _free(f"{letter}{row + 1}", first)
             first[ids[row]] = row
-            notes.append(f"{table.places[row]} has no id and is called {ids[row]}")
+            notes.append(f"{table.places[row]} has no id and is named {ids[row]}")
     return ids
 
 
@@ -224,7 +223,7 @@ def _free(name: str, taken: dict[str, int]) -> str:
 
 
 def _refuse_unnamed_sum(table: Table, ids: list[str], required: FloatArray) -> None:
-    """Refuse a last row without id whose number is the sum of those above: nobody can tell whether it is a total."""
+    """Raise an error for a last row without an id whose number is the sum of those above, as it may be a total."""
     if len(ids) > 2 and not ids[-1] and all(ids[:-1]) and np.isclose(required[-1], required[:-1].sum(), rtol=1e-9):
         raise table.error(
             "has no id and looks like the sum of the rows above; call it 'Total', or give it an id", len(ids) - 1

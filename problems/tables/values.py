@@ -1,4 +1,4 @@
-"""Cells to values: yes and no, lists of names, and places in one cell."""
+"""Parsing of cells: booleans, lists of names, angles and coordinates."""
 
 import re
 from collections.abc import Iterable, Sequence
@@ -14,11 +14,11 @@ ANGLE = re.compile(
     re.IGNORECASE,
 )
 MARKS = (";", "|", "\n", ",")
-"""What separates names, in the order in which they are looked for."""
+"""Separators of names, in order of preference."""
 
 
 def flag(table: Table, row: int, column: int) -> bool:
-    """Return whether a cell says yes; an empty one says no."""
+    """Return a cell as a boolean; an empty cell is False."""
     cell = table.rows[row][column]
     text = as_text(cell).casefold()
     if isinstance(cell, bool):
@@ -34,13 +34,13 @@ def flag(table: Table, row: int, column: int) -> bool:
 
 
 def separators(cells: Iterable[Cell]) -> str:
-    """Return the marks that separate the names in some cells, nothing where blanks do."""
+    """Return the separators of names in some cells; empty if names are separated by blanks."""
     texts = [cell for cell in cells if isinstance(cell, str)]
     return "".join(mark for mark in MARKS if any(mark in text for text in texts))
 
 
 def names_in(cell: Cell, marks: str) -> list[str]:
-    """Return the names that a cell lists, separated by any of these marks, or by blanks where there are none."""
+    """Return the names in a cell, separated by any of `marks`, or by blanks if there are none."""
     if cell is None:
         return []
     if isinstance(cell, Sequence | set | frozenset) and not isinstance(cell, str):
@@ -53,7 +53,7 @@ def names_in(cell: Cell, marks: str) -> list[str]:
 
 
 def angle(text: str) -> float | None:
-    """Return an angle in degrees, such as ``47.5``, ``47,5 N``, ``8° 30' W``; None where it is none."""
+    """Parse an angle in degrees, such as ``47.5``, ``47,5 N`` or ``8° 30' W``; None if it is not an angle."""
     match = ANGLE.fullmatch(text.strip())
     return None if match is None else _degrees(match)
 
@@ -67,9 +67,9 @@ def _degrees(match: "re.Match[str]") -> float:
 
 
 def coordinates(cell: Cell) -> list[float] | None:
-    """Return the two or three numbers of a place in one cell; None where it holds something else.
+    """Parse two or three coordinates in a cell; None if it contains something else.
 
-    Marks of the compass put latitude first where it stands second.
+    With compass directions, latitude is returned first in any case.
     """
     if isinstance(cell, Sequence) and not isinstance(cell, str):
         return [float(one) for one in cell if is_real(one)] if len(cell) in (2, 3) and all(map(is_real, cell)) else None

@@ -1,4 +1,4 @@
-"""Columns that the user names, and the tables that they are of."""
+"""Columns specified by the user, and the tables to which they belong."""
 
 from collections.abc import Mapping
 from typing import cast
@@ -11,7 +11,7 @@ FIELDS = frozenset(name for synonyms in SYNONYMS.values() for name in synonyms)
 
 
 class Wanted:
-    """The columns that the user names, for one table or for whichever has them."""
+    """Columns specified by the user, for one table or for any table that has them."""
 
     def __init__(self, columns: Mapping[str, str]) -> None:
         self._columns = dict(columns)
@@ -23,7 +23,7 @@ class Wanted:
                 raise InputError(f"there is no field {name!r}{nearest(field, sorted(known or FIELDS))}", "columns")
 
     def of(self, kind: Kind, grid: Grid) -> dict[str, str]:
-        """Return the columns that are named for a table."""
+        """Return the specified columns of a table."""
         chosen: dict[str, str] = {}
         for name, text in self._columns.items():
             owner, dot, field = name.rpartition(".")
@@ -35,11 +35,11 @@ class Wanted:
         return chosen
 
     def _is_only(self, field: str) -> bool:
-        """Whether no other table has such a field."""
+        """Return whether no other table has such a field."""
         return sum(field in synonyms for synonyms in SYNONYMS.values()) == 1
 
     def require_all_used(self) -> None:
-        """Raise `InputError` for a column that no table has."""
+        """Raise `InputError` for a specified column that no table has."""
         for name, text in self._columns.items():
             if name not in self._used:
                 raise InputError(f"{name}={text}: no table has a column {text!r}", "columns")
@@ -50,7 +50,7 @@ def _has(grid: Grid, text: str) -> bool:
 
 
 def is_number(text: str) -> bool:
-    """Whether a text stands for a number rather than a column."""
+    """Return whether a text is a number instead of a column name."""
     try:
         float(text)
     except ValueError:

@@ -1,1 +1,1 @@
-"""How people write what tables hold: names of columns, units and numbers."""
+"""Recognition of column names, units and numbers as users write them."""

@@ -1,4 +1,4 @@
-"""Numbers in texts: decimal commas and points, groups of three, and units behind them."""
+"""Numbers in texts, with decimal commas or points, digit groups, and units."""
 
 import re
 from collections.abc import Iterable
@@ -16,28 +16,28 @@ ABSENT = words(
     "-, --, \u2013, \u2014, ?, ., n/a, na, n.a., n. a., nan, none, null, nil, tbd, k.a., k. a., keine, "
     "unlimited, no limit, unbegrenzt, illimit\u00e9, ilimitado, inf, infinity, \u221e"
 )
-"""Texts that stand for no number, or for no limit."""
+"""Texts that mean a missing number, or no limit."""
 
 
 REMEMBERED = 1 << 16
-"""Texts whose reading is kept: columns hold the same numbers again and again, and each is looked at several times."""
+"""Size of the cache of parsed texts, as columns repeat numbers and each is parsed several times."""
 
 
 def is_absent(text: str) -> bool:
-    """Whether a text stands for no number, or for no limit."""
+    """Return whether a text means a missing number, or no limit."""
     return text.casefold() in ABSENT
 
 
 @lru_cache(REMEMBERED)
 def split_number(text: str) -> tuple[str, str] | None:
-    """Return the digits of a number with their marks, and what stands behind them; None where no number begins."""
+    """Return the digits of a number with their marks, and the text after them; None if there is no number."""
     text = text.translate(MINUS)
     groups = GROUPED.match(text)
     if groups:
         plain = re.sub(r"[^\d+-]", "", groups[1])
         rest = text[groups.end() :]
         found = NUMBER.match(plain + rest)
-        # whoever groups by blanks has no other marks of groups: what follows is the decimal mark
+        # with digits grouped by blanks, any other mark is the decimal mark
         if found and found[1][len(plain) : len(plain) + 1] in ("", ",", ".", "e", "E"):
             tail = found[1][len(plain) :]
             return plain + (tail + "e0" if tail[:1] in (",", ".") and "e" not in tail.lower() else tail), found[2]
@@ -48,9 +48,9 @@ def split_number(text: str) -> tuple[str, str] | None:
 
 @lru_cache(REMEMBERED)
 def mark_of(digits: str) -> str:
-    """Return the decimal mark that a number shows, ``?,`` or ``?.`` where it may be that of groups, ``""`` for none.
+    """Return the decimal mark of a number, ``?,`` or ``?.`` if it may also separate digit groups, ``""`` for none.
 
-    A number that fits neither is ``!``.
+    ``!`` stands for an invalid number.
     """
     body = digits.lower().lstrip("+-")
     mantissa, exponent, _ = body.partition("e")
@@ -76,6 +76,6 @@ def number_of(digits: str, mark: Mark) -> float:
 
 
 def decimal_marks(numbers: Iterable[str]) -> set[Mark]:
-    """Return the decimal marks that some numbers show beyond doubt."""
+    """Return the unambiguous decimal marks of some numbers."""
     found = {mark_of(digits) for digits in numbers}
     return {mark for mark in (",", ".") if mark in found}

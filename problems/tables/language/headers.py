@@ -1,4 +1,4 @@
-"""Headers of columns: the name and the unit that each holds."""
+"""Parsing of column headers into name and unit."""
 
 import re
 import unicodedata
@@ -23,29 +23,29 @@ FILLERS = re.compile(
     r"|launch|current|initial|agent|drone|robot|vehicle|task|job|site|target|customer)\s+"
     r"|\s+(?:max|maximum|nominal|net|rated|est|estimated)$"
 )
-"""Words that change nothing of what a column is."""
+"""Words that do not change the meaning of a column name."""
 
 USED = ("energy", "charge", "volume")
-"""Kinds of units of what agents use up."""
+"""Kinds of units of what agents consume."""
 
 ENDINGS = frozenset(("id", "lat", "lon"))
-"""Fields that a name is of where its last word alone is, such as `Standort Lat` and `Asset ID`."""
+"""Fields that are recognised by the last word of a name alone, as in `Standort Lat` and `Asset ID`."""
 
 
 @dataclass(frozen=True)
 class Header:
-    """What a header says.
+    """A parsed header.
 
     Attributes
     ----------
     text : str
-        As it stands in the table.
+        Original text.
     ranks : dict of str to int
-        Fields that the column may be, and how sure its name is of each: 0 is surest.
+        Fields that the column may be, with the rank of each; 0 is most certain.
     measure : Measure, optional
-        Its unit, if it has one.
+        Unit of the column, if any.
     label : str
-        What stands in square brackets or round ones and is no known unit: a unit of the user's own, or a remark.
+        Text in square brackets or parentheses that is not a known unit: a custom unit, or a remark.
     """
 
     text: str
@@ -55,7 +55,7 @@ class Header:
 
 
 def plain(text: str) -> str:
-    """Return a name in small letters without accents, its words separated by single blanks."""
+    """Return a name in lower case without accents, with words separated by single spaces."""
     text = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", text)
     decomposed = unicodedata.normalize("NFKD", text).casefold()
     letters = "".join(letter for letter in decomposed if not unicodedata.combining(letter))
@@ -64,7 +64,7 @@ def plain(text: str) -> str:
 
 @cache
 def names(kind: Kind) -> dict[str, dict[str, int]]:
-    """Return the fields, with their ranks, that each name of a column may be."""
+    """Return the possible fields of each column name, with their ranks."""
     found: dict[str, dict[str, int]] = {}
     for field, ranks in SYNONYMS[kind].items():
         for rank, texts in enumerate(ranks):
@@ -79,7 +79,7 @@ def names(kind: Kind) -> dict[str, dict[str, int]]:
 
 
 def ranks_of(text: str, kind: Kind) -> dict[str, int]:
-    """Return the fields that a name may be; the names of fields themselves come first, other wordings last."""
+    """Return the possible fields of a name; exact names of fields rank first, other wordings last."""
     name, known = plain(text), names(kind)
     for candidate in (name, name.replace(" ", "")):
         if candidate in known:
@@ -92,7 +92,7 @@ def ranks_of(text: str, kind: Kind) -> dict[str, int]:
 
 
 def _ranks_by_unit(measure: Measure | None, kind: Kind, ranks: Mapping[str, int]) -> Mapping[str, int]:
-    """Return what a column may be by its name, or by a unit that says more: of what is used per distance, or held."""
+    """Return the possible fields by name, or by a more specific unit, such as consumption per distance."""
     if measure is None or kind != "agents" or kind_of(measure.top) not in USED:
         return ranks
     if not ranks and kind_of(measure.bottom) == "distance":
@@ -102,7 +102,7 @@ def _ranks_by_unit(measure: Measure | None, kind: Kind, ranks: Mapping[str, int]
 
 
 def header_of(text: str, kind: Kind) -> Header:
-    """Return what a header says, its unit in brackets or behind its name."""
+    """Parse a header with a unit in brackets or after its name."""
     bracket = BRACKETS.match(text)
     if bracket and (bracket[1] or bracket[3]):
         measure = measure_of(bracket[2])

@@ -1,4 +1,4 @@
-"""Units as they are written in headers and behind numbers, and their proportions."""
+"""Units in headers and after numbers, and conversions between them."""
 
 import re
 import unicodedata
@@ -18,7 +18,7 @@ SCALES: dict[str, dict[str, float]] = {
     "share": {"%": 1.0},
     "angle": {"°": 1.0},
 }
-"""How many of the first of its kind one of each unit is."""
+"""Size of each unit in terms of the first unit of its kind."""
 
 ALIASES = {
     "meter": "m", "meters": "m", "metre": "m", "metres": "m", "metros": "m", "kms": "km", "kilometer": "km",
@@ -36,7 +36,7 @@ KINDS = {label.casefold(): (kind, label) for kind, scale in SCALES.items() for l
 
 @dataclass(frozen=True)
 class Measure:
-    """A unit, or one over another: ``kWh/100km`` is kWh over km, of which one is a hundredth."""
+    """A unit, or a ratio of two with a factor: ``kWh/100km`` is kWh per km with factor 1/100."""
 
     top: str
     bottom: str = ""
@@ -47,12 +47,12 @@ class Measure:
 
 
 def kind_of(label: str) -> str:
-    """Return whether a label is one of distance, time, energy and so on, ``""`` where it is unknown."""
+    """Return the kind of a unit, such as distance, time or energy, ``""`` if unknown."""
     return KINDS.get(label.casefold(), ("", ""))[0]
 
 
 def proportion(label: str, target: str) -> float | None:
-    """Return how many `target` one `label` is, None where that is unknown."""
+    """Return the size of unit `label` in terms of unit `target`, None if unknown."""
     if label == target:
         return 1.0
     kind = kind_of(label)
@@ -62,7 +62,7 @@ def proportion(label: str, target: str) -> float | None:
 
 
 def measure_of(text: str) -> Measure | None:
-    """Return the unit that a text is, such as ``km/h``, ``kg per hour`` or ``m²``; None where it is none."""
+    """Parse a unit, such as ``km/h``, ``kg per hour`` or ``m²``; None if it is not a unit."""
     plain = unicodedata.normalize("NFKC", text).strip().strip(".").replace("^", "")
     plain = re.sub(r"\s*(?:/|\bper\b|\bpro\b|\bpar\b|\bpor\b)\s*", "/", plain, flags=re.IGNORECASE)
     plain = re.sub(r"[\s·*]*\bh-1$", "/h", re.sub(r"\bs-1$", "/s", plain))
@@ -84,13 +84,13 @@ def _label(text: str) -> str | None:
 
 
 def rate_of(text: str) -> Measure | None:
-    """Return a unit of work of the user's own, alone or by time: ``panels/h``; None where that is no word."""
+    """Parse a custom unit of work, alone or per time, such as ``panels/h``; None if it is not a word."""
     found = own_measure(text)
     is_rate = not found.bottom or kind_of(found.bottom) == "time"
     return found if is_rate and 0 < len(found.top) <= LONGEST_LABEL else None
 
 
 def own_measure(text: str) -> Measure:
-    """Return the unit that a text must be, known or not."""
+    """Parse a text that must be a unit, known or not."""
     top, _, bottom = re.sub(r"\s+per\s+", "/", text.strip()).partition("/")
     return Measure(_label(top) or top.strip(), _label(bottom) or bottom.strip())

@@ -1,15 +1,15 @@
-"""What people call the columns: names in English, German, French and Spanish, the surest first."""
+"""Synonyms of column names in English, German, French and Spanish, the most certain first."""
 
 from collections.abc import Mapping
 
 
 def words(text: str) -> frozenset[str]:
-    """Return the texts that stand in a list with commas."""
+    """Return the texts in a comma-separated list."""
     return frozenset(text.split(", "))
 
 
 Synonyms = Mapping[str, tuple[str, ...]]
-"""Fields by their name; each text lists names with commas, and those of an earlier text come first."""
+"""Comma-separated lists of names for each field; names in earlier lists rank first."""
 
 PLACES: Synonyms = {
     "x": ("x", "pos x, position x, x position, x coordinate, coord x, easting, rechtswert"),
@@ -135,20 +135,20 @@ KINDS = {
     "tasks": "task, job, order, mission, target, site, customer, stop, auftrag, aufgabe",
     "bases": "base, depot, airfield, station, hub",
 }
-"""What agents and tasks are called; `drone_id` and `Drone No.` are ids of agents."""
+"""Words for agents, tasks and bases; `drone_id` and `Drone No.` are ids of agents."""
 
 UNCLEAR_PLACES = words(
     "location, coordinates, coordinate, coords, koordinaten, coordonnees, coordenadas, standort, ort, lage, place, "
     "ubicacion, emplacement"
 )
-"""Columns that may hold latitude and longitude, x and y, or a name."""
+"""Columns that may contain latitude and longitude, x and y, or a name."""
 
 TOTALS = words(
     "total, totals, grand total, sum, sum total, overall, summe, gesamt, gesamtsumme, insgesamt, somme, "
     "total general, total generale, suma, average, mean, mittelwert, durchschnitt, mittel, moyenne, promedio, media, "
     "count, anzahl, nombre total, \u2211, \u03c3, \u00f8"
 )
-"""What the row of a total or a mean below the others is called."""
+"""Names of the row of a total or a mean below the others."""
 
 LEVELS = {
     "lowest": 0.5, "low": 1.0, "minor": 1.0, "niedrig": 1.0, "gering": 1.0, "basse": 1.0, "baja": 1.0,
@@ -156,12 +156,12 @@ LEVELS = {
     "high": 3.0, "hoch": 3.0, "haute": 3.0, "alta": 3.0, "urgent": 4.0, "critical": 4.0, "highest": 4.0,
     "dringend": 4.0, "kritisch": 4.0, "urgente": 4.0,
 }  # fmt: skip
-"""Priorities in words."""
+"""Priorities given as words."""
 
 FIRST_IS_HIGHEST = (
     r"\b1\s*(?:=|is|:|ist)\s*(?:the |most |very )*(?:urgent|high|top|first|hoch|hö|dring|sehr|haut|alt|prior)"
 )
-"""What a header says in which small numbers are urgent."""
+"""Pattern of a header of priorities in which small numbers are most urgent."""
 
 YES = words("yes, y, true, 1, x, ja, j, wahr, oui, o, vrai, si, sí, s, verdadero, \u2713, \u2714, on")
 NO = words("no, n, false, 0, nein, falsch, non, faux, falso, \u2717, \u2718, -, off")

@@ -178,7 +178,7 @@ def test_sheets_are_named_or_the_first(tmp_path: Path) -> None:
     path.write_bytes(workbook([["id", "ability"], ["a", 1]], sheet="Drones"))
     with pytest.raises(InputError, match=r"has no sheet 'Drone' \(did you mean 'Drones'\?\)"):
         read_grid(f"{path}:Drone")
-    with pytest.raises(InputError, match="holds agents and tasks at once; name a sheet for each, or two files"):
+    with pytest.raises(InputError, match="cannot be both agents and tasks; name a sheet for each, or two files"):
         Instance.from_tables(read_grid(f"{path}:Drones"), read_grid(f"{path}:Drones"))
     assert read_grid(path).notes == ("the first of 2 sheets, 'Sheet', was read",)
 
