@@ -167,8 +167,8 @@ NUMBERS = [
     Case(
         "a name taken for something else",
         "Gerät;Rate\nM 1;schnell\n",
-        error="agents.csv: line 2, column 'Rate': must be a number, got 'schnell'; if this is not the ability, say "
-        "which is by --map ability=COLUMN",
+        error="agents.csv: line 2, column 'Rate': must be a number, got 'schnell'; if this is not the ability, specify "
+        "it by --map ability=COLUMN",
     ),
     Case("devices", "Gerät;Rate\nM 1;4\n", fields={"agent_ids": ("M 1",), "ability": [4]}),
     Case(
