@@ -1,4 +1,4 @@
-"""Exact by constraint programming: OR-Tools CP-SAT over classes of agents."""
+"""The exact method `cpsat`: constraint programming with OR-Tools CP-SAT over classes of agents."""
 
 import sys
 from collections.abc import Callable, Iterable, Iterator
@@ -17,25 +17,25 @@ from alloc.allocators.exact.stages import ExactAllocator
 from alloc.problems.instance import IntArray
 
 NEED_STEPS = 2**40
-"""Steps into which the need of a task is divided where it is no integer; each agent rounds up by at most one."""
+"""Number of steps into which a non-integer need is divided; each agent's weight is rounded up by at most one step."""
 
 COST_STEPS = 2**36
-"""Steps into which the cost of the plan to begin with is divided; each agent rounds down by at most one."""
+"""Number of steps into which the cost of the initial plan is divided; each agent's cost loses less than one step."""
 
 MAX_SUM = 2**58
-"""No sum in the model exceeds this, far enough below 2^63 for the solver's own arithmetic."""
+"""Upper bound on all sums in the model, well below 2^63 to leave room for the solver's own arithmetic."""
 
 REPEATABLE_EFFORT = 20.0
-"""Limit of one call where runs must be repeatable, in the solver's deterministic seconds."""
+"""Limit of one call in repeatable runs, in the solver's deterministic seconds."""
 
 CHUNK = 10_000
-"""Variables made between two looks at whether the run is over."""
+"""Number of variables created between two checks of whether the run is over."""
 
 WholeArray = NDArray[np.int64]
 
 
 class CpSatSolver:
-    """The back end of OR-Tools."""
+    """The CP-SAT back end."""
 
     max_pairs = 2_000_000
     pairs_per_second = 60_000
@@ -70,7 +70,7 @@ class CpSat(ExactAllocator):
 
 
 class _Reporter(cp_model.CpSolverSolutionCallback):
-    """Reports every plan that the solver finds on its way."""
+    """Reports every plan that the solver finds."""
 
     def __init__(self, pairs: int, monitor: SolverMonitor) -> None:
         super().__init__()
@@ -81,13 +81,13 @@ class _Reporter(cp_model.CpSolverSolutionCallback):
 
 
 def formulate(model: SolverModel, stopped: Callable[[], bool] = lambda: False) -> tuple[cp_model.CpModel, float] | None:
-    """Write the model of `exact.model` down in integers; its first variables are x.
+    """Formulate the model of `exact.model` in integers; its first variables are x.
 
     Returns
     -------
     program : CpModel
     scale : float
-        Of its costs, see `integer_costs`; 1 without costs. None is returned if `stopped` says so before all is done.
+        Scale of the costs, see `integer_costs`; 1 without costs. The result is None if `stopped` returns True.
     """
     demand, program = model.demand, cp_model.CpModel()
     x: list[cp_model.IntVar] = []
@@ -127,7 +127,7 @@ def _add_work(program: cp_model.CpModel, x: list[cp_model.IntVar], demand: Deman
 
 
 def _add_agents(program: cp_model.CpModel, x: list[cp_model.IntVar], demand: Demand) -> Iterator[None]:
-    """(agents): min_agents_k <= sum_j x_kj <= count_k, where that says more than the bounds of the variables."""
+    """(agents): min_agents_k <= sum_j x_kj <= count_k, unless the bounds of the variables imply it."""
     min_agents = demand.min_agents.tolist()
     for k, pairs in enumerate(_grouped(demand.class_of_pair, len(demand.count))):
         if min_agents[k] > 0 or demand.max_count[pairs].sum() > demand.count[k]:
@@ -137,9 +137,9 @@ def _add_agents(program: cp_model.CpModel, x: list[cp_model.IntVar], demand: Dem
 
 
 def integer_weights(demand: Demand) -> tuple[WholeArray, WholeArray]:
-    """Return weights and needs in integers such that every plan that meets `demand` meets these.
+    """Return integer weights and needs, a relaxation: every plan that meets `demand` meets them.
 
-    Weights are rounded up and needs down, so that what is infeasible here is infeasible indeed.
+    Weights are rounded up and needs down, so that infeasibility of the rounded model is a proof.
     """
     scale = 1.0
     if not demand.integral:
@@ -149,9 +149,9 @@ def integer_weights(demand: Demand) -> tuple[WholeArray, WholeArray]:
 
 
 def integer_costs(model: SolverModel) -> tuple[WholeArray, float]:
-    """Return costs in integers, rounded down, and their scale: a bound on them bounds the true costs too.
+    """Return integer costs, rounded down, and their scale: a lower bound on them also bounds the true costs.
 
-    A pair that alone costs more than the plan at hand is cut to that cost, which no bound can exceed anyway.
+    The cost of a pair is capped at that of the incumbent plan, which no bound can exceed anyway.
     """
     assert model.cost is not None
     known = 0.0 if model.hint is None else float(model.cost @ model.hint)
@@ -161,7 +161,7 @@ def integer_costs(model: SolverModel) -> tuple[WholeArray, float]:
 
 
 def _grouped(group: IntArray, groups: int) -> list[IntArray]:
-    """Indices of the pairs in each group."""
+    """Return the indices of the pairs in each group."""
     order = np.argsort(group, kind="stable")
     return np.split(order, np.searchsorted(group[order], np.arange(1, groups)))
 
@@ -172,7 +172,7 @@ def _set_parameters(solver: cp_model.CpSolver, model: SolverModel) -> None:
     parameters.presolve_inclusion_work_limit = 0  # with wide coefficients it cuts off solutions (OR-Tools 9.15)
     parameters.random_seed = limits.seed % 2**31
     parameters.num_workers = 1 if limits.repeatable else limits.threads
-    if model.cost is None and model.demand.spare == 0:  # all equations: presolve finds nothing and takes long
+    if model.cost is None and model.demand.spare == 0:  # only equations: presolve is slow and finds nothing
         parameters.cp_model_presolve = False
     if np.isfinite(limits.seconds):
         parameters.max_time_in_seconds = limits.seconds

@@ -1,4 +1,4 @@
-"""The constraints at a fixed makespan T: what each agent adds, what each task needs, how many agents there are."""
+"""Data of the constraints at a fixed makespan T: weights of agents, needs of tasks, and sizes of classes."""
 
 from dataclasses import dataclass, replace
 
@@ -7,12 +7,12 @@ import numpy as np
 from alloc.problems.instance import FloatArray, IntArray
 
 MET = 1 - 1e-9
-"""Part of a need at which the need counts as met, so that rounding rules out no T."""
+"""Share of a need from which it counts as met, so that no T is excluded by rounding errors."""
 
 
 @dataclass(frozen=True, eq=False)
 class Demand:
-    """Data of the constraints (work) and (agents) of `exact.model` at T; pairs that are of no use are left out.
+    """Data of the constraints (work) and (agents) of `exact.model` at T, without pairs of no use.
 
     Attributes
     ----------
@@ -21,19 +21,19 @@ class Demand:
     class_of_pair, task_of_pair : ndarray of int, shape (p,)
         Class, and row in `need`, of each pair: k and j of its variable x_kj.
     weight : ndarray, shape (p,)
-        What one agent of the class adds to the task, at most its need.
+        Contribution of one agent of the class to the task, capped at the need.
     max_count : ndarray of int, shape (p,)
-        Upper bound of the variable: agents of the class that the task could use.
+        Upper bound of the variable: number of agents of the class that the task could use.
     need : ndarray, shape (t,)
-        Least sum of weights of each task.
+        Required sum of weights of each task.
     count : ndarray of int, shape (k,)
-        Agents in each class.
+        Number of agents in each class.
     min_served : int
-        How many of the tasks must be served: all, t, unless too few agents can reach them.
+        Number of tasks that must be served: all, t, unless too few agents can reach them.
     integral : bool
         Whether weights and needs are integers.
     spare : float
-        Ability beyond the sum of all needs, in their unit; ``inf`` where it is not known.
+        Total ability minus the sum of all needs, in their unit; ``inf`` if unknown.
     ability : ndarray, shape (k,)
         Ability of each class, in the same unit.
     """
@@ -52,12 +52,12 @@ class Demand:
 
     @property
     def max_weight(self) -> FloatArray:
-        """Largest sum of weights of each task that leaves enough ability to the others, shape (t,)."""
+        """Largest sum of weights of each task that leaves enough ability for the others, shape (t,)."""
         return self.need + self.spare
 
     @property
     def min_agents(self) -> IntArray:
-        """How many of each class must work, as the needs exceed the ability of the others, shape (k,)."""
+        """Number of agents of each class that must work, as the other classes cannot meet all needs, shape (k,)."""
         if np.isinf(self.spare):
             return np.zeros_like(self.count)
         useful = np.bincount(self.class_of_pair, minlength=len(self.count)) > 0
@@ -70,14 +70,14 @@ class Demand:
 
     @property
     def trivially_infeasible(self) -> bool:
-        """Whether all abilities together are too small, or too many tasks fall short even if all agents come."""
+        """Whether total ability is too small, or too many tasks cannot be met even by all agents."""
         if self.spare < 0:
             return True
         all_come = np.bincount(self.task_of_pair, weights=self.weight * self.max_count, minlength=len(self.need))
         return int((all_come >= self.need * MET).sum()) < self.min_served
 
     def only(self, pairs: IntArray) -> "Demand":
-        """Return the constraints with some of the pairs, given by index."""
+        """Return the constraints restricted to some of the pairs, given by index."""
         return replace(
             self,
             class_of_pair=self.class_of_pair[pairs],

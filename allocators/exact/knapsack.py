@@ -1,15 +1,15 @@
-"""The cheapest group for a task at given prices: a knapsack by dynamic programming, compiled.
+"""The cheapest group for a task at given prices: a knapsack problem by dynamic programming, compiled.
 
 A group takes some of the agents of each class, at most `copies` of them; each adds `weight` (a whole number) and costs
 `price`. Its weights must sum to a need or more, or if `exact` to the need itself. One table answers for every need up
 to `most`, so that tasks at the same prices share it:
 
     table = fill_table(weight, price, copies, most, False)
-    costs = table[0]                                 # of needs 0, 1, ..., most; inf where no group will do
+    costs = table[0]                                 # of needs 0, 1, ..., most; inf if infeasible
     group = read_group(table, len(weight), need)     # agents of each class in the cheapest group for `need`
 
-Takes O(items * most) time and bytes. Of each weight only the cheapest agents become items, and those alike are packed
-by powers of two, so that there are at most O(most * log(most)) of them, whatever the number of agents.
+Time and memory are O(items * most). For each weight only the cheapest agents become items, and identical ones are
+packed by powers of two, so that there are O(most * log(most)) items, whatever the number of agents.
 
 References
 ----------
@@ -30,7 +30,7 @@ Table = tuple[FloatArray, WholeArray, WholeArray, WholeArray, NDArray[np.uint8]]
 
 @compiled
 def order_of(value: FloatArray) -> WholeArray:
-    """Return the indices that sort `value`, by Shell's method: numpy's takes over a second to compile."""
+    """Return the indices that sort `value`, by Shell sort, as numpy's sort takes over a second to compile."""
     order = np.empty(len(value), dtype=np.int64)
     for k in range(len(value)):
         order[k] = k
@@ -50,11 +50,11 @@ def order_of(value: FloatArray) -> WholeArray:
 def pack_items(
     weight: WholeArray, price: FloatArray, copies: WholeArray, most: int, exact: bool
 ) -> tuple[WholeArray, WholeArray]:
-    """Return class and agents of each item of the knapsack, shape (i,): all that a cheapest group could have.
+    """Return class and number of agents of each item, shape (i,), enough for a cheapest group.
 
-    Agents with a negative price are all items, unless the sum must be met exactly.
+    All agents with a negative price become items, unless the sum must be met exactly.
     """
-    left = np.zeros(most + 1, dtype=np.int64)  # how many more of this weight are of use
+    left = np.zeros(most + 1, dtype=np.int64)  # number of further agents of each weight that are of use
     for w in range(1, most + 1):
         left[w] = most // w if exact else (most + w - 1) // w
     bits = 2
@@ -84,25 +84,25 @@ def pack_items(
 
 @compiled
 def fill_table(weight: WholeArray, price: FloatArray, copies: WholeArray, most: int, exact: bool) -> Table:
-    """Return the least cost of every need up to `most`, and what `read_group` needs.
+    """Return the least cost of every need up to `most`, with the tables for `read_group`.
 
     Parameters
     ----------
     weight : ndarray of int64, shape (k,)
-        What one agent of each class adds; classes with none are left out.
+        Contribution of one agent of each class; classes with weight 0 are ignored.
     price : ndarray of float64, shape (k,)
-        What one agent of each class costs; may be negative, but not nan.
+        Cost of one agent of each class; may be negative, but not nan.
     copies : ndarray of int64, shape (k,)
-        Agents in each class.
+        Number of agents in each class.
     most : int
         The largest need, >= 0.
     exact : bool
-        Whether needs are to be met exactly, rather than exceeded.
+        Whether needs must be met exactly, without surplus.
 
     Returns
     -------
     Table
-        Its first entry, shape (most + 1,), is the least cost of each need, ``inf`` where no group will do.
+        Its first entry, shape (most + 1,), is the least cost of each need, ``inf`` if infeasible.
     """
     item_class, size = pack_items(weight, price, copies, most, exact)
     added = np.empty(len(item_class), dtype=np.int64)
@@ -151,7 +151,7 @@ def cheapest_group(
     need : int
         Least sum of weights, >= 0.
     max_weight : int
-        Largest sum of weights; no limit where that is below 0.
+        Largest sum of weights; unlimited if negative.
 
     Returns
     -------

@@ -1,8 +1,8 @@
 """The cheapest group for a task with a limit on the sum of weights, by a knapsack over a core of classes; compiled.
 
-At the price of weight at which the linear relaxation breaks, each agent has a reduced cost. Only classes whose reduced
-cost is small, the core, are left open; the others are taken or left by its sign. The core grows until the gap between
-its best group and the relaxation is less than the reduced cost of any class outside.
+At the optimal dual price of weight in the linear relaxation, each agent has a reduced cost. Only the core, the classes
+with small reduced costs, is optimised; the other classes are taken or left by its sign. The core is enlarged until the
+gap between its best group and the relaxation is less than the reduced cost of any class outside.
 
 References
 ----------
@@ -16,14 +16,14 @@ from alloc.allocators.runtime.compiled import compiled
 from alloc.problems.instance import FloatArray
 
 FIRST_CORE = 24
-"""Classes left open at first."""
+"""Initial number of classes in the core."""
 
 
 @compiled
 def cheapest_by_core(
     weight: WholeArray, price: FloatArray, copies: WholeArray, need: int, max_weight: int
 ) -> tuple[float, WholeArray]:
-    """Return what `knapsack.cheapest_group` does, faster where there are many classes; `max_weight` >= `need`."""
+    """Return the same as `knapsack.cheapest_group`, faster for many classes; `max_weight` >= `need`."""
     classes = len(weight)
     reduced, change = np.empty(classes), np.empty(classes)
     core_weight, core_price = np.empty(classes, dtype=np.int64), np.empty(classes)
@@ -69,7 +69,7 @@ def solve_relaxation(
     reduced: FloatArray,
     full: WholeArray,
 ) -> float:
-    """Return the cost of the linear relaxation; write the reduced cost of each class, and the agents it takes whole."""
+    """Return the value of the linear relaxation; write the reduced cost of each class and its integral part."""
     classes, total, rate = len(weight), 0, 0.0
     for k in range(classes):
         reduced[k] = price[k] / weight[k]

@@ -1,10 +1,10 @@
-"""The cheapest group for a task by lists of states, for weights of any size and for reals; compiled.
+"""The cheapest group for a task by lists of states, for large or real weights; compiled.
 
-Agents are sorted by price per weight, and a group that takes them in this order until the need is met is the first
-state. Around the last agent taken, one after the other is left open: each state may do without the next agent before,
-or with the next one after. A state is dropped where another weighs no less and costs no more, or where the linear
-relaxation of all agents not yet open leaves it no cheaper than the best group known. So the time depends on how many
-agents nearly pay, and not on the size of the numbers.
+Agents are sorted by price per weight; the group that takes them in this order until the need is met is the first state.
+Around the last agent taken, the core is extended alternately: each state may drop the next agent before it, or add the
+next one after it. A state is discarded if another weighs no less and costs no more, or if the linear relaxation over
+all agents outside the core shows that it leads to no cheaper group than the best known. So the time depends on the
+number of agents with small reduced costs rather than on the size of the numbers.
 
 References
 ----------
@@ -20,21 +20,21 @@ from alloc.allocators.runtime.compiled import compiled, inlined
 from alloc.problems.instance import FloatArray
 
 MAX_STATES = 100_000
-"""States of one knapsack after which it ends with a bound by their linear relaxations."""
+"""Number of states of one knapsack after which it ends with a lower bound by their linear relaxations."""
 
 CHEAPER = 0.5
-"""By how much a group must be cheaper where prices are whole: less than 1, more than the rounding of relaxations."""
+"""Least improvement for integer prices: less than 1, more than the rounding errors of relaxations."""
 
 
 class States(NamedTuple):
-    """Space for states: what each weighs and costs, and the agent that it takes or leaves other than its parent.
+    """Arrays of states: weight, cost, parent, and the agent that is added or dropped relative to the parent.
 
     Attributes
     ----------
     weight, cost : ndarray, shape (s,)
     parent, changed : ndarray of int64, shape (s,)
     live, next_live : ndarray of int64, shape (s,)
-        States that are still of interest, by falling weight and cost.
+        States that have not been discarded, by descending weight and cost.
     """
 
     weight: FloatArray
@@ -47,7 +47,7 @@ class States(NamedTuple):
 
 @compiled
 def room_for_states(size: int) -> States:
-    """Return space for so many states."""
+    """Allocate arrays for `size` states."""
     real, whole = np.empty((2, size)), np.empty((4, size), dtype=np.int64)
     return States(real[0], real[1], whole[0], whole[1], whole[2], whole[3])
 
@@ -57,22 +57,22 @@ def extend(
     states: States, live: int, used: int, item: int, weight: float, price: float, need: float, best: int,
     before: float, after: float, cheaper: float,
 ) -> tuple[int, int, int]:  # fmt: skip
-    """Give every live state the choice to change an item; return how many live and are used, and the best group.
+    """Branch every live state on changing an item; return the numbers of live and used states, and the best state.
 
     Parameters
     ----------
     live, used : int
-        How many states live, and how many have been written.
+        Number of live states, and of states written.
     item : int
-        The agent that is left open now.
+        The agent that is added to the core.
     weight, price : float
-        What the change adds; negative where the agent is left.
+        Effect of the change; negative if the agent is dropped.
     best : int
         The cheapest state that meets `need`.
     before, after : float
-        Prices per weight of the agents that are left open next.
+        Prices per weight of the agents that come next into the core.
     cheaper : float
-        By how much a group must be cheaper than the best to be of interest.
+        Least improvement on the best group.
     """
     kept, p, q = 0, 0, 0
     least = np.inf
@@ -108,7 +108,7 @@ def extend(
 
 @inlined
 def relax_state(cost: float, spare: float, before: float, after: float) -> float:
-    """Return the cost of the linear relaxation by what a state has to spare and the next prices per weight."""
+    """Return the value of a state's linear relaxation, given its surplus and the next prices per weight."""
     return cost - spare * before if spare >= 0 else cost - spare * after
 
 
@@ -122,20 +122,20 @@ def cheapest_by_states(
     Parameters
     ----------
     weight : ndarray, shape (k,)
-        What one agent of each class adds, > 0. Where they are whole, sums up to the need and one more agent are exact.
+        Contribution of one agent of each class, > 0. If integer, sums up to the need plus one agent are exact.
     price : ndarray, shape (k,)
         >= 0.
     copies : ndarray of int64, shape (k,)
     need : float
         > 0.
     cheaper : float
-        `CHEAPER` where prices are whole, all together less than 2^50; else 0.
+        `CHEAPER` for integer prices with a sum less than 2^50; otherwise 0.
     states : States
-        Space to work in. Where it does not suffice, the cost is a lower bound on that of the cheapest group.
+        Scratch. If it is too small, the returned cost is a lower bound on that of the cheapest group.
     group : ndarray of int64, shape (k,)
-        Gets the agents of each class in the cheapest group that was found.
+        Output: the agents of each class in the cheapest group found.
     excess : ndarray, shape (k,) or (0,)
-        Gets lower bounds on how much dearer the best group with an agent of the class is.
+        Output: lower bounds on the extra cost of the best group with an agent of the class.
     """
     ratio = price / weight
     order = order_of(ratio)
@@ -185,7 +185,7 @@ def cheapest_by_states(
 
 @compiled
 def write_group(states: States, state: int, agent: WholeArray, taken: int, group: WholeArray) -> None:
-    """Change `group`, which has the first `taken` agents, to that of a state."""
+    """Turn `group`, which consists of the first `taken` agents, into the group of a state."""
     while states.parent[state] >= 0:
         item = states.changed[state]
         group[agent[item]] += -1 if item < taken else 1

@@ -1,4 +1,4 @@
-"""Local search within a run of an exact method, in turns with other phases or beside them in its own thread."""
+"""Local search within a run of an exact method, alternating with other phases or in parallel in its own thread."""
 
 from collections import deque
 from concurrent.futures import Future
@@ -18,7 +18,7 @@ from alloc.allocators.parallel.pool import Pool
 from alloc.problems import Allocation, Objective
 
 REPEATABLE_ITERATIONS = 50
-"""Iterations of a turn where effort is counted."""
+"""Iterations of a turn in repeatable runs."""
 
 
 class LocalSearchPhase:
@@ -27,13 +27,13 @@ class LocalSearchPhase:
     Parameters
     ----------
     search : Search
-        The run; it has a plan.
+        The run, which must have a plan.
     objective : Objective
-        The makespan alone, or the energy within `limit`.
+        The makespan only, or the energy within `limit`.
     until_s : float
         Seconds since the run began at which the phase must end.
     limit : float, optional
-        Makespan up to which the energy decides, in hours.
+        Makespan in hours up to which the energy is minimised.
     """
 
     def __init__(self, search: Search, objective: Objective, until_s: float, limit: float | None = None) -> None:
@@ -64,11 +64,11 @@ class LocalSearchPhase:
 
     @property
     def is_beside(self) -> bool:
-        """Whether it works in a thread of its own, so that it needs no turns."""
+        """Whether it runs in its own thread and needs no turns."""
         return self._pool is not None
 
     def turn(self, seconds: float) -> None:
-        """Improve the plan for so long, unless that is done in another thread anyway; submit what was found."""
+        """Improve the plan for `seconds`, unless another thread does so anyway, and submit improvements."""
         if not self.is_beside:
             for known in (self._search.fastest, self._search.best):
                 if known is not None:
@@ -80,7 +80,7 @@ class LocalSearchPhase:
         self.exchange()
 
     def _improve(self, until_s: float, iterations: float) -> None:
-        """Improve the plan; for the makespan, from where the last turn ended unless there is a better plan."""
+        """Improve the plan; for the makespan, resume from the last turn unless there is a better plan."""
         part = self._part
         if part.objective is not Objective.MAKESPAN:
             improve(part, until_s=until_s, iterations=iterations)
@@ -92,7 +92,7 @@ class LocalSearchPhase:
         self._reduction.run(Clock(part, until_s, part.iteration + iterations))
 
     def exchange(self) -> None:
-        """Submit what was found to the run, and pass its bound on to the local search."""
+        """Submit improvements to the run, and pass its bound on to the local search."""
         while self._found:
             self._search.submit(self._found.popleft())
         self._part.raise_bound(self._search.lower_bound)

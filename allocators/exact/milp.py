@@ -1,6 +1,6 @@
-"""Exact by mixed-integer programming: formulated in cvxpy over classes of agents, solved by HiGHS.
+"""The exact method `milp`: mixed-integer programming over classes of agents, formulated in cvxpy, solved by HiGHS.
 
-cvxpy compiles the model; HiGHS gets the compiled arrays itself, so that it can be stopped and read at any time.
+cvxpy compiles the model; HiGHS is called directly on the compiled arrays, so that it can be interrupted and queried.
 """
 
 from collections.abc import Sequence
@@ -21,27 +21,27 @@ from alloc.problems.bounds import scale_to_one
 from alloc.problems.instance import FloatArray, IntArray
 
 TOLERANCE = 1e-9
-"""How far HiGHS may be off a row or an integer."""
+"""Feasibility and integrality tolerance of HiGHS."""
 
 MAX_UNSCALED = 100_000
-"""Needs up to this are left in whole numbers, which HiGHS makes use of; rows with larger ones are scaled to 1."""
+"""Integer needs up to this are kept, as HiGHS exploits integrality; rows with larger needs are scaled to 1."""
 
 COST_CAP = 2.0**20
-"""Scaled cost to which that of a pair is cut if it exceeds the cost of the plan at hand: it would blur the others."""
+"""Cap on the scaled cost of pairs that cost more than the incumbent plan, to preserve the precision of the others."""
 
 SMALL_WEIGHT, SMALL_WEIGHT_SCALE = 1e-6, 2.0**10
-"""Weights below this part of a need are within the tolerance, unless rows are scaled up by this factor."""
+"""Weights below this share of a need would be within the tolerance; then rows are scaled up by the second value."""
 
 SMALLEST_COEFFICIENT = 1e-12
-"""Coefficients below this count as 0: the least value that HiGHS takes for this option."""
+"""Coefficients below this count as 0: the smallest value that HiGHS accepts for this option."""
 
 REPEATABLE_NODES = 5_000
-"""Limit of one call in nodes of the search tree where runs must be repeatable."""
+"""Limit of one call in repeatable runs, in nodes of the search tree."""
 
 
 @dataclass(frozen=True, eq=False)
 class CompiledModel:
-    """Compiled: minimise ``cost @ x`` with ``matrix @ x <= limit`` and ``0 <= x <= upper``, x integer.
+    """Minimise ``cost @ x`` subject to ``matrix @ x <= limit`` and ``0 <= x <= upper``, x integer.
 
     Attributes
     ----------
@@ -60,7 +60,7 @@ class CompiledModel:
 
 
 class HighsSolver:
-    """The back end of cvxpy and HiGHS."""
+    """The cvxpy and HiGHS back end."""
 
     max_pairs = 2_000_000
     pairs_per_second = 200_000
@@ -99,7 +99,7 @@ class Milp(ExactAllocator):
 
 
 def formulate(model: SolverModel) -> tuple[cp.Problem, cp.Variable]:
-    """Write the model of `exact.model` down in cvxpy; the variable returned is x."""
+    """Formulate the model of `exact.model` in cvxpy; the variable returned is x."""
     demand, pairs = model.demand, np.arange(len(model.demand.class_of_pair))
     scale = _row_scale(demand)
     need = demand.need * scale
@@ -122,7 +122,7 @@ def formulate(model: SolverModel) -> tuple[cp.Problem, cp.Variable]:
 
 
 def _row_scale(demand: Demand) -> float | FloatArray:
-    """Return the factor of each row of (work) that keeps coefficients well above the tolerance."""
+    """Return the scale of each row of (work) that keeps coefficients well above the tolerance."""
     scale: float | FloatArray = 1.0 if demand.need.max() <= MAX_UNSCALED else 1 / demand.need
     if not demand.integral and demand.weight.min(initial=1.0) < SMALL_WEIGHT:
         scale = SMALL_WEIGHT_SCALE * scale
@@ -130,9 +130,9 @@ def _row_scale(demand: Demand) -> float | FloatArray:
 
 
 def scaled_costs(model: SolverModel) -> tuple[FloatArray, float]:
-    """Return costs at which the plan at hand costs about 1 per agent, and their scale, a power of two.
+    """Return costs scaled such that the incumbent plan costs about 1 per agent, and their scale, a power of two.
 
-    The cost of a pair is cut where it exceeds that of the plan at hand and is large: no better plan has the pair.
+    Large costs of pairs that exceed the cost of the incumbent plan are capped: no better plan uses such a pair.
     """
     assert model.cost is not None
     agents = float(model.demand.count.sum())
@@ -196,7 +196,7 @@ def _options(model: SolverModel) -> dict[str, bool | int | float | str]:
 
 
 def _read(highs: highspy.Highs, compiled: CompiledModel, model: SolverModel) -> Answer:
-    """Trust a solution only if HiGHS itself calls it feasible: at a limit without one, it hands out zeros."""
+    """Read a solution only if HiGHS reports it as feasible: at a limit without incumbent, it returns zeros."""
     status, info = highs.getModelStatus(), highs.getInfo()
     if status in (highspy.HighsModelStatus.kInfeasible, highspy.HighsModelStatus.kUnboundedOrInfeasible):
         return Answer(Verdict.INFEASIBLE)
@@ -207,7 +207,7 @@ def _read(highs: highspy.Highs, compiled: CompiledModel, model: SolverModel) -> 
 
 
 def _safe_bound(dual_bound: float, model: SolverModel) -> float:
-    """Lower what HiGHS proves by its tolerances, which count for each agent, and undo the scale of the costs."""
+    """Return the bound of HiGHS in unscaled costs, reduced by its tolerances, which add up over agents."""
     if model.cost is None or not np.isfinite(dual_bound):
         return 0.0
     least = min(dual_bound * (1 - 10 * TOLERANCE), dual_bound - TOLERANCE * float(model.demand.count.sum()))

@@ -1,7 +1,7 @@
 """The model of the paper, (4) and (5), as integer programmes over classes of agents.
 
 Sets and data
-    k       classes of agents alike in all that matters: count_k agents, each with ability_k and speed_k
+    k       classes of interchangeable agents: count_k agents, each with ability_k and speed_k
     j       tasks with workload_j > 0
     d_kj    distance of class k to task j; pairs (k, j) out of reach have no variable
 
@@ -13,7 +13,7 @@ An agent of class k begins on task j after d_kj / speed_k hours, so that the com
 
     sum_k ability_k max(0, T - d_kj / speed_k) x_kj >= workload_j                                   for each task j,
 
-and (5), minimise max_j T_j, is to find the least T at which there is a plan: integer x with this and
+and (5), minimise max_j T_j, asks for the least T at which there is a plan: integer x with these constraints and
 
     sum_j x_kj <= count_k                                                                          for each class k.
 
@@ -23,16 +23,15 @@ At a fixed T these are linear. With need_j = workload_j / T and weight_kj = abil
     (agents)    min_agents_k <= sum_j x_kj <= count_k               for each class k
     (energy)    minimise sum_kj d_kj x_kj                           in the second stage only
 
-Needs and weights are counted in the unit of which all abilities are multiples, or where there is none in parts of the
-task's workload. `Demand` holds this data at one T; `cpsat.formulate` and `milp.formulate` write it down for their
-solvers. Where not all tasks can be served, a binary y_j says which are: need_j y_j takes the place of need_j, and
+Needs and weights are in the unit of which all abilities are multiples, or, if there is none, in shares of the task's
+workload. `Demand` holds these data at one T; `cpsat.formulate` and `milp.formulate` state the model for their solvers.
+If not all tasks can be served, a binary y_j says whether task j is: need_j y_j replaces need_j, and
 sum_j y_j >= min_served.
 
-Two reformulations keep every integer plan and cut off fractional ones. Weights are cut to the need. Where abilities are
-multiples of a unit, needs are rounded up to it; then all abilities less all needs leave a known amount to spare, which
-limits what a task may get beyond its need (max_weight_j = need_j + spare) and how many agents may stay idle
-(min_agents_k). On the paper's scenarios nothing is to spare at the optimum. Without a unit max_weight_j is infinite and
-min_agents_k is 0.
+Two reformulations keep every integer plan and cut off fractional ones. Weights are capped at the need. If abilities are
+multiples of a unit, needs are rounded up to it; then total ability minus total need is a known slack, which limits the
+surplus of a task (max_weight_j = need_j + spare) and the number of idle agents (min_agents_k). In the paper's
+scenarios, the slack is 0 at the optimum. Without a unit, max_weight_j is infinite and min_agents_k is 0.
 
 References
 ----------
@@ -49,10 +48,10 @@ from alloc.problems import IDLE, AgentClasses, Allocation, Instance
 from alloc.problems.instance import FloatArray, IntArray
 
 FEW_PAIRS = 200
-"""Pairs of class and task up to which a solver is so quick that nothing else is tried before it."""
+"""Number of pairs of class and task up to which the solver is so fast that it is called at once."""
 
 ROUNDING = 1e-12
-"""Relative slack on needs, so that rounding in the last digits never makes a plan too slow."""
+"""Relative slack on needs, so that no plan is excluded by rounding errors."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,17 +62,17 @@ class Model:
     ----------
     classes : AgentClasses
     tasks : ndarray of int, shape (t,)
-        The tasks with workload; the others need nobody.
+        The tasks with workload; the others need no agents.
     workload : ndarray, shape (t,)
         Their workloads.
     class_of_pair, task_of_pair : ndarray of int, shape (p,)
         Class, and index into `tasks`, of each pair within reach.
     travel_time : ndarray, shape (p,), or None
-        Hours until an agent of the class arrives; None where travel takes no time.
+        Hours until an agent of the class arrives; None if travel takes no time.
     unit : float or None
-        All abilities are multiples of it; None if no such unit is found, or travel takes time.
+        Unit of which all abilities are multiples; None if there is none, or travel takes time.
     min_served : int
-        How many of the tasks must be served.
+        Number of tasks that must be served.
     """
 
     classes: AgentClasses
@@ -87,7 +86,7 @@ class Model:
 
     @classmethod
     def build(cls, instance: Instance, classes: AgentClasses, min_served: int) -> "Model":
-        """Collect the pairs of class and task with workload."""
+        """Build the model of an instance and its classes of agents."""
         tasks = np.flatnonzero(instance.workload > 0)
         class_of_pair, task_of_pair = np.nonzero(classes.mask[:, tasks])
         travel_time = None
@@ -133,30 +132,30 @@ class Model:
         )
 
     def columns(self, plan: Allocation) -> IntArray:
-        """Return the index into `tasks` of the task of each agent, shape (n,); t for idle agents and other tasks."""
+        """Return each agent's task as an index into `tasks`, shape (n,); t for idle agents and other tasks."""
         tasks = np.append(self.tasks, np.iinfo(np.intp).max)
         column = np.searchsorted(tasks, plan.task_of_agent)
         return np.where(tasks[column] == plan.task_of_agent, column, len(self.tasks))
 
     def plan_of(self, column: IntArray) -> Allocation:
-        """Return the plan of such indices; agents with t are idle."""
+        """Return the plan given by the indices of `columns`; agents with index t are idle."""
         return Allocation(np.append(self.tasks, IDLE)[column])
 
     def pairs_at(self, demand: Demand) -> IntArray:
-        """Return which of the model's pairs are those of `demand`."""
+        """Return the indices of the pairs of `demand` among the model's pairs."""
         columns = len(self.tasks)
         pairs = self.class_of_pair * columns + self.task_of_pair
         return np.searchsorted(pairs, demand.class_of_pair * columns + demand.task_of_pair)
 
     def shares(self, time: float) -> FloatArray:
-        """Return the part of each task that one agent of each class does by `time`, shape (k, t), at most 1."""
+        """Return the share of each task that one agent of each class does by `time`, shape (k, t), at most 1."""
         share = np.zeros((self.classes.size, len(self.tasks)))
         done = self._rate(time) * (time / self.workload[self.task_of_pair])
         share[self.class_of_pair, self.task_of_pair] = np.minimum(1.0, done)
         return share
 
     def uncapped(self, time: float) -> tuple[FloatArray, FloatArray]:
-        """Return weights that are not cut to the need, shape (k, t), 0 out of reach, and needs, shape (t,)."""
+        """Return weights without the cap at the need, shape (k, t), 0 out of reach, and needs, shape (t,)."""
         weight = np.zeros((self.classes.size, len(self.tasks)))
         if self.unit is None:
             weight[self.class_of_pair, self.task_of_pair] = self._rate(time)
@@ -167,7 +166,7 @@ class Model:
     def next_makespan(self, time: float) -> float:
         """Return a lower bound on the makespan of every plan that is slower than `time`.
 
-        Where abilities are multiples of a unit, makespans are workloads over multiples of it, with gaps between them.
+        If abilities are multiples of a unit, makespans are workloads divided by such multiples, with gaps between them.
         """
         if self.unit is None:
             return time
@@ -177,30 +176,30 @@ class Model:
         return max(time, float((self.workload[need > 1] / (need[need > 1] - 1)).min() / self.unit * (1 - ROUNDING)))
 
     def earliest_with_same_needs(self, time: float) -> float:
-        """Return the least T at which the tasks need the same as at `time`, or `time` where that is not known."""
+        """Return the least T at which the needs are the same as at `time`, or `time` if that is unknown."""
         if self.unit is None:
             return time
         return min(time, float((self.workload / self._units_needed(time)).max() / self.unit))
 
     def allocation(self, demand: Demand, counts: IntArray) -> Allocation:
-        """Turn numbers of agents per pair of `demand`, shape (p,), into an allocation."""
+        """Return the allocation with these numbers of agents per pair of `demand`, shape (p,)."""
         table = np.zeros(self.classes.mask.shape, dtype=np.intp)
         table[demand.class_of_pair, self.tasks[demand.task_of_pair]] = counts
         return self.classes.spread(table)
 
     def plan(self, table: IntArray) -> Allocation:
-        """Turn numbers of agents per class and task with workload, shape (k, t), into an allocation."""
+        """Return the allocation with these numbers of agents per class and task with workload, shape (k, t)."""
         full = np.zeros(self.classes.mask.shape, dtype=np.intp)
         full[:, self.tasks] = table
         return self.classes.spread(full)
 
     def counts(self, demand: Demand, allocation: Allocation) -> IntArray:
-        """Return the numbers of agents per pair of `demand`, leaving out those that it has no use for."""
+        """Return the numbers of agents per pair of `demand`; agents on other pairs are left out."""
         table = self.classes.tally(allocation)
         return np.minimum(table[demand.class_of_pair, self.tasks[demand.task_of_pair]], demand.max_count)
 
     def _rate(self, time: float) -> FloatArray:
-        """Mean work per hour until `time` of one agent of each pair."""
+        """Return the mean work per hour until `time` of one agent of each pair."""
         rate = self.classes.ability[self.class_of_pair]
         if self.travel_time is None:
             return rate

@@ -1,4 +1,4 @@
-"""What the calling thread does while a solver runs: submit its plans, and stop it when the run is over."""
+"""Monitoring of a running solver by the calling thread: submits its plans, and stops it when the run is over."""
 
 import threading
 from collections import deque
@@ -16,19 +16,19 @@ Outcome = TypeVar("Outcome")
 
 
 class SolverMonitor:
-    """Submits the plans that a solver reports, and sees when it must stop.
+    """Submits the plans that a solver reports, and checks when it must stop.
 
     Parameters
     ----------
     search : Search
     model : Model
     demand : Demand
-        The constraints that the counts given to `report` meet.
+        The constraints to which the counts given to `report` belong.
     until_s : float
         Seconds since the run began at which the solver must end.
     meanwhile : callable, optional
-        Work for the calling thread, done each time that it polls the solver, for 50 ms at most; returns whether the
-        solver is no longer needed.
+        Work for the calling thread at every poll of the solver, for at most 50 ms; returns whether the solver is no
+        longer needed.
     """
 
     def __init__(
@@ -50,12 +50,12 @@ class SolverMonitor:
         self._reported.append(counts)
 
     def run(self, work: Callable[[], Outcome], stop: Callable[[], None]) -> Outcome | None:
-        """Run `work` in its own thread until it ends, or call `stop` when time is up or the run is to end.
+        """Run `work` in its own thread until it ends; call `stop` when time is up or the run must end.
 
         Returns
         -------
         object or None
-            What `work` returns; None if it did not end soon after `stop`.
+            The value returned by `work`; None if it did not end soon after `stop`.
         """
 
         def stop_all() -> None:
@@ -74,7 +74,7 @@ class SolverMonitor:
         return over or self._meanwhile()
 
     def _submit(self) -> None:
-        """Submit the last plan reported; an exception of the user's callback waits until the solver has ended."""
+        """Submit the last reported plan; an exception of the user's callback is raised after the solver has ended."""
         try:
             while self._reported and self._error is None:
                 self._search.submit(self._model.allocation(self._demand, self._reported.popleft()))
@@ -83,5 +83,5 @@ class SolverMonitor:
 
 
 def is_over(search: Search) -> bool:
-    """Whether the run must end; a makespan proven to 1e-6 is no reason, as exact methods go on to the end."""
+    """Whether the run must end; a makespan proven to 1e-6 is no reason, as exact methods continue to a full proof."""
     return search.stop_reason() not in (None, StopReason.PROVEN)

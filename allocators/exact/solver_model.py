@@ -1,4 +1,4 @@
-"""The model that a stage gives to a solver, the answer, and the protocol that back ends implement."""
+"""The model that a stage passes to a solver, the answer, and the protocol of back ends."""
 
 from dataclasses import dataclass
 from enum import Enum
@@ -11,13 +11,13 @@ from alloc.problems.instance import FloatArray, IntArray
 
 
 class Verdict(Enum):
-    """Whether a makespan, or a model, has a plan."""
+    """Whether there is a plan for a makespan or a model."""
 
     FEASIBLE = "feasible"
-    """A plan is at hand."""
+    """A plan was found."""
 
     INFEASIBLE = "infeasible"
-    """It is proven that there is none."""
+    """It is proven that there is no plan."""
 
     UNKNOWN = "unknown"
     """Neither a plan nor a proof was found within the limits."""
@@ -34,7 +34,7 @@ class SolverLimits:
     threads : int
     seed : int
     repeatable : bool
-        Whether effort is limited by counting work, so that the same seed gives the same answer.
+        Whether effort is limited by work counts instead of time, so that the same seed gives the same answer.
     """
 
     seconds: float
@@ -50,16 +50,16 @@ class SolverLimits:
 
 @dataclass(frozen=True, eq=False)
 class SolverModel:
-    """The integer programme at a fixed T, see `exact.model`: constraints, and an objective if there is one.
+    """The integer programme at a fixed T, see `exact.model`: constraints and, optionally, an objective.
 
     Attributes
     ----------
     demand : Demand
         The constraints.
     cost : ndarray, shape (p,), or None
-        Cost >= 0 of one agent of each pair, to be minimised; None if any plan will do.
+        Cost >= 0 of one agent of each pair, to be minimised; None for a feasibility problem.
     hint : ndarray of int, shape (p,), or None
-        Agents per pair of a plan to begin with.
+        Agents per pair of a plan, as a warm start.
     limits : SolverLimits
     """
 
@@ -71,15 +71,15 @@ class SolverModel:
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """What a solver found out.
+    """Answer of a solver.
 
     Attributes
     ----------
     verdict : Verdict
     counts : ndarray of int, shape (p,), or None
-        Agents per pair of the best plan where the verdict is FEASIBLE; the evaluator decides whether it holds.
+        Agents per pair of the best plan if the verdict is FEASIBLE; subject to confirmation by the evaluator.
     bound : float
-        No plan costs less.
+        Lower bound on the cost of all plans.
     """
 
     verdict: Verdict = Verdict.UNKNOWN
@@ -93,19 +93,19 @@ class Solver(Protocol):
     Attributes
     ----------
     max_pairs : int
-        Pairs of agent class and task above which no model is built.
+        Largest number of pairs of agent class and task for which a model is built.
     pairs_per_second : int
-        Pairs of which a model is built in a second.
+        Speed of model building in pairs per second.
     """
 
     max_pairs: int
     pairs_per_second: int
 
     def solve_model(self, model: SolverModel, monitor: SolverMonitor) -> Answer:
-        """Solve `model` in a thread of its own, reporting the plans on the way to `monitor`."""
+        """Solve `model` in its own thread, and report all plans found to `monitor`."""
         ...
 
 
 def is_repeatable(search: Search) -> bool:
-    """Whether the run is limited by iterations alone, so that effort must be counted and not timed."""
+    """Whether the run is limited by iterations alone, so that effort must be counted rather than timed."""
     return search.budget.time_limit_s is None and search.budget.iterations is not None

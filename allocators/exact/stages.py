@@ -1,11 +1,11 @@
-"""The recipe of the exact methods: a start, the least makespan, then the least energy at it."""
+"""The stages of the exact methods: an initial plan, the least makespan, then the least energy at it."""
 
 from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 import scipy.optimize
-import scipy.sparse.csgraph  # noqa: F401 - both are loaded with the method, so that no run waits for them
+import scipy.sparse.csgraph  # noqa: F401 - both are loaded with the method, so that they do not delay a run
 
 from alloc.allocators.contract.base import Allocator, Proposal
 from alloc.allocators.contract.budget import Budget
@@ -25,10 +25,10 @@ from alloc.allocators.heuristic.local_search import annealing_state
 from alloc.problems import Instance, Objective, count_classes, fewest_unserved, serve_all
 
 MAKESPAN_SHARE = 0.6
-"""Part of the time limit after which the makespan stage gives way to the energy stage, proven or not."""
+"""Share of the time limit after which the energy stage begins, whether the makespan is proven or not."""
 
 PATIENCE = 2.0
-"""The energy stage also begins when no faster plan came for this multiple of the time until the fastest was found."""
+"""The energy stage also begins after this multiple of the time until the fastest plan, without a faster one."""
 
 
 @dataclass(frozen=True)
@@ -38,10 +38,10 @@ class ExactParameters(CheckedParameters):
     Attributes
     ----------
     descent : bool
-        Whether plans are looked for before the solver runs.
+        Whether to search for plans before the solver runs.
     plain : bool
-        Whether the solver gets the model with a variable for each agent and task, as ``alloc export --model plain``
-        writes it, and nothing else is done: no start, no searches, no bounds of our own.
+        Whether to only run the solver, without heuristics or bounds of this package, on the model with a variable for
+        each agent and task that ``alloc export --model plain`` writes.
     """
 
     descent: bool = True
@@ -60,7 +60,7 @@ class ExactAllocator(Allocator):
     Raises
     ------
     InputError
-        If a setting is unknown, or of the wrong type.
+        If a parameter is unknown or of the wrong type.
     """
 
     solver: ClassVar[Solver]
@@ -77,7 +77,7 @@ class ExactAllocator(Allocator):
         annealing_state.compile_loops()
 
     def refusal(self, instance: Instance, objective: Objective, budget: Budget) -> str | None:
-        """Refuse models that would take most of the time only to be built."""
+        """Refuse models that would take most of the time limit just to be built."""
         if self.parameters.plain:
             return refusal_of_plain(instance, self.solver.max_pairs)
         limit, per_second, seconds = self.solver.max_pairs, self.solver.pairs_per_second, budget.time_limit_s
@@ -90,7 +90,7 @@ class ExactAllocator(Allocator):
         return f"it takes {limit} pairs of agent class and task{in_time}, this has {pairs}"
 
     def allocate(self, search: Search) -> Proposal:
-        """Return bounds; every plan on the way is submitted."""
+        """Return proven bounds; submit every plan found."""
         if self.parameters.plain:
             return allocate_plain(search, self.plain_solver)
         instance = search.instance
@@ -104,7 +104,7 @@ class ExactAllocator(Allocator):
         return Proposal(energy_lower_bound=self._minimise_both(search, min_served))
 
     def _minimise_both(self, search: Search, min_served: int) -> float | None:
-        """Run both stages, again where the energy was proven early and the makespan had not had all of its time."""
+        """Run both stages; repeat if the energy was proven early and the makespan stage had not used all its time."""
         bound: float | None = None
         patience = PATIENCE
         while True:
@@ -115,10 +115,10 @@ class ExactAllocator(Allocator):
                 found = least_energy(search, self.solver, min_served)
             bound = max((known for known in (bound, found) if known is not None), default=None)
             if found is None or complete or search.fast_enough or is_over(search):
-                return bound  # what holds within a makespan holds within a lesser one
+                return bound  # bounds at a makespan also hold at smaller ones
 
     def _minimise_makespan(self, search: Search, min_served: int, share: float, patience: float) -> bool:
-        """Run the makespan stage for a share of the time left at most; return whether more would not help."""
+        """Run the makespan stage for at most a share of the time left; return whether more time would not help."""
         until_s = np.inf
         if search.budget.time_limit_s is not None:
             until_s = search.elapsed_s + share * search.remaining_s

@@ -1,1 +1,1 @@
-"""The least energy at a makespan: plans and bounds."""
+"""The energy stage: plans and lower bounds for the least energy at a makespan."""

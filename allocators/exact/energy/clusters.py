@@ -1,4 +1,4 @@
-"""Clusters of tasks near each other, whose common knapsack strengthens the Lagrangian bound."""
+"""Clusters of nearby tasks, whose joint knapsack strengthens the Lagrangian bound."""
 
 from dataclasses import dataclass
 
@@ -13,16 +13,16 @@ from alloc.problems.instance import FloatArray
 
 
 def pairwise_distance(place: FloatArray) -> FloatArray:
-    """Return how far any two places are apart, large numbers being scaled, shape (t, t)."""
+    """Return the distances between all pairs of places, shape (t, t), scaled if coordinates are large."""
     known = np.nan_to_num(place)
     known = known / max(1.0, float(np.abs(known).max(initial=0.0)))
     return np.asarray(np.sqrt(((known[:, None] - known[None]) ** 2).sum(axis=2)))
 
 
 def cluster_tasks(task_distance: FloatArray) -> Mask:
-    """Return clusters of up to a quarter of the tasks by average linkage, as rows of members, shape (f, t).
+    """Return clusters of up to a quarter of the tasks by average linkage, one per row of members, shape (f, t).
 
-    Larger ones raise the bound little for the time that they take.
+    Larger clusters take long and hardly raise the bound.
     """
     tasks = len(task_distance)
     member = np.vstack([np.eye(tasks, dtype=bool), np.zeros((tasks - 1, tasks), dtype=bool)])
@@ -35,9 +35,9 @@ def cluster_tasks(task_distance: FloatArray) -> Mask:
 
 
 def overlapping_clusters(task_distance: FloatArray, most: int) -> Mask:
-    """Return the clusters of `cluster_tasks`, and each task with its nearest ones, up to as many, shape (f, t).
+    """Return the clusters of `cluster_tasks`, and sets of up to that size of each task and its nearest, shape (f, t).
 
-    At most `most` clusters, which leaves out those of many nearest tasks first.
+    There are at most `most` clusters; the largest sets of nearest tasks are left out first.
     """
     nested, near = cluster_tasks(task_distance), np.argsort(task_distance, axis=1, kind="stable")
     tasks, rows = len(task_distance), []
@@ -45,7 +45,7 @@ def overlapping_clusters(task_distance: FloatArray, most: int) -> Mask:
         row = np.zeros((tasks, tasks), dtype=bool)
         np.put_along_axis(row, near[:, :size], True, axis=1)
         rows.append(row)
-        if size * tasks >= 2 * most:  # of which some are the same
+        if size * tasks >= 2 * most:  # some of which are duplicates
             break
     together = np.vstack([nested, *rows])
     return np.asarray(together[np.sort(np.unique(together, axis=0, return_index=True)[1])][:most])
@@ -53,14 +53,14 @@ def overlapping_clusters(task_distance: FloatArray, most: int) -> Mask:
 
 @dataclass(frozen=True, eq=False)
 class Clusters:
-    """Knapsacks of whole clusters: one entry for each cluster and class of which some agents may work there.
+    """Knapsacks of clusters, with an entry for each cluster and class of which some agents may work there.
 
     Attributes
     ----------
     model : EnergyModel
-        The entries as pairs, clusters taking the place of tasks; costs are 0.
+        The entries as pairs, with clusters in place of tasks; costs are 0.
     link : csr_array, shape (pairs, entries)
-        Which entries each pair of class and task counts for.
+        The entries to which each pair of class and task belongs.
     """
 
     model: EnergyModel
@@ -68,9 +68,9 @@ class Clusters:
 
     @classmethod
     def build(cls, model: EnergyModel, member: Mask) -> "Clusters":
-        """Collect the entries of the clusters, rows of `member`, shape (f, t).
+        """Build the entries of the clusters, which are the rows of `member`, shape (f, t).
 
-        Classes whose agents must all work in one cluster are no entries of it: they lessen its need.
+        Classes whose agents must all work in one cluster have no entry there; they reduce its need instead.
         """
         assert model.ability is not None
         classes = len(model.count)
@@ -111,7 +111,7 @@ def _entries(
         copies=copies,
         cost=np.zeros(len(agent_class)),
         need=np.maximum(need, 0),
-        max_weight=np.maximum(max_weight, -1),  # below 0 no plan would do, and without a limit the bound still holds
+        max_weight=np.maximum(max_weight, -1),  # if negative there is no plan; the bound also holds without a limit
         count=model.count,
         min_agents=model.min_agents,
         ability=None,

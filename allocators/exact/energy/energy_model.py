@@ -1,4 +1,4 @@
-"""The least-energy problem in small whole numbers, or in parts of needs: what the Lagrangian relaxation bounds."""
+"""The least-energy problem in small integers, or in shares of needs, as bounded by the Lagrangian relaxation."""
 
 from dataclasses import dataclass, replace
 
@@ -14,17 +14,17 @@ from alloc.problems.instance import FloatArray
 Mask = NDArray[np.bool_]
 
 MAX_NEED = 5000
-"""Whole needs up to this are left as they are."""
+"""Integer needs up to this are not rounded."""
 
 SMALLEST_WEIGHT = 1e-12
-"""Part of a need to which smaller weights are raised."""
+"""Share of a need to which smaller weights are raised."""
 
 
 @dataclass(frozen=True, eq=False)
 class EnergyModel:
-    """(work), (agents) and (energy) of `exact.model`, the pairs in the order of tasks.
+    """(work), (agents) and (energy) of `exact.model`, with pairs sorted by task.
 
-    Weights and needs are whole numbers, or all floats: then needs are about 1 and have no `max_weight`.
+    Weights and needs are all integers or all floats; in the latter case needs are about 1 and have no `max_weight`.
 
     A plan gives each task j agents with weights that sum to ``need[j]`` at least and ``max_weight[j]`` at most, and has
     from `min_agents` to `count` agents of each class at work.
@@ -34,17 +34,17 @@ class EnergyModel:
     class_of_pair, task_of_pair : ndarray of int, shape (p,)
         Class and task of each pair.
     weight : ndarray of int or float, shape (p,)
-        What one agent adds to the task.
+        Contribution of one agent to the task.
     copies : ndarray of int, shape (p,)
-        Agents that the task could use.
+        Number of agents that the task could use.
     cost : ndarray, shape (p,)
         Distance of one agent.
     need : ndarray of int or float, shape (t,)
     max_weight : ndarray of int, shape (t,)
-        -1 where there is no limit.
+        -1 for no limit.
     count, min_agents : ndarray of int, shape (k,)
     ability : ndarray of int, shape (k,), or None
-        What one agent adds to any task, for the clusters; None where that depends on the task.
+        Contribution of one agent to any task, for the clusters; None if that depends on the task.
     """
 
     class_of_pair: WholeArray
@@ -70,24 +70,24 @@ class EnergyModel:
         )
 
     def by_class(self, group: csr_array) -> csr_array:
-        """Return the agents of each class in groups given by pairs, shapes (g, k) and (g, p)."""
+        """Return the agents of each class, shape (g, k), in groups given by pairs, shape (g, p)."""
         pairs = len(self.class_of_pair)
         entry = (np.ones(pairs), (np.arange(pairs), self.class_of_pair))
         return csr_array(group @ csr_array(entry, shape=(pairs, len(self.count))))
 
     @property
     def is_whole(self) -> bool:
-        """Whether weights and needs are whole numbers."""
+        """Whether weights and needs are integers."""
         return self.need.dtype.kind == "i"
 
     @property
     def first(self) -> WholeArray:
-        """Where the pairs of each task begin, shape (t + 1,)."""
+        """Index of the first pair of each task, shape (t + 1,)."""
         return np.searchsorted(self.task_of_pair, np.arange(len(self.need) + 1)).astype(np.int64)
 
 
 def round_demand(demand: Demand, cost: FloatArray) -> tuple[EnergyModel, WholeArray]:
-    """Write `demand` in small whole numbers, or else in parts of needs, such that every plan that meets it meets these.
+    """Return a relaxation of `demand` in small integers or in shares of needs: every plan that meets it meets these.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ def round_demand(demand: Demand, cost: FloatArray) -> tuple[EnergyModel, WholeAr
     -------
     EnergyModel
     ndarray of int
-        Which pairs of `demand` its pairs are; pairs too large for their task are left out.
+        Indices of its pairs in `demand`; pairs too large for their task are left out.
     """
     order = np.lexsort((demand.class_of_pair, demand.task_of_pair))
     agent_class, task, need = demand.class_of_pair[order], demand.task_of_pair[order], demand.need

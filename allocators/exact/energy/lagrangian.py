@@ -1,12 +1,12 @@
 """A lower bound on the least energy by Lagrangian relaxation of (agents), strengthened by clusters of tasks.
 
-With a dual price on the agents of each class every task takes its cheapest group on its own, a knapsack. What all
-groups cost, less what the agents cost at these prices, bounds the cost of every plan from below. A *cluster* of tasks
-near each other adds that it, too, must get whole agents: its members pay dual prices to the cluster for their agents,
-at which the cluster solves a knapsack of its own. Prices follow a deflected subgradient.
+With dual prices on the agents of the classes, the cheapest group of each task is a separate knapsack. The total cost of
+these groups, less the value of all agents at these prices, is a lower bound on the cost of every plan. A *cluster* of
+nearby tasks adds the constraint that it must also get an integer number of agents: its members pay dual prices for
+their agents to the cluster, which solves a knapsack of its own. Prices follow a deflected subgradient.
 
-A pair of class and task whose use would lift the bound above the cost of a plan at hand is dropped: no better plan has
-it. With fewer pairs knapsacks and clusters shrink, and the bound rises.
+A pair of class and task whose use would raise the bound above the cost of the incumbent plan is dropped, as no better
+plan uses it. With fewer pairs, knapsacks and clusters shrink, and the bound rises.
 
 References
 ----------
@@ -30,16 +30,16 @@ from alloc.problems.instance import FloatArray
 
 @dataclass(frozen=True)
 class StepRule:
-    """How the steps of the subgradient method change.
+    """Parameters of the steps of the subgradient method.
 
     Attributes
     ----------
     deflection : float
-        Part of the last direction that is added to the subgradient.
+        Share of the last direction that is added to the subgradient.
     patience : int
-        Rounds without a better bound after which steps get shorter.
+        Rounds without a better bound after which steps are shortened.
     decay : float
-        Factor by which they get shorter.
+        Factor by which they are shortened.
     """
 
     deflection: float
@@ -48,28 +48,28 @@ class StepRule:
 
 
 BRIEF, CLUSTERED, LASTING = StepRule(0.75, 20, 0.7), StepRule(0.95, 60, 0.8), StepRule(0.99, 60, 0.8)
-"""Until the clusters are added, with them, and where there are none: more prices, and more time, need longer memory and
+"""Rules before clusters are added, with clusters, and without any: more prices, and more time, need longer memory and
 more patience."""
 
 FIRST_STEP_PRICED = 0.1
-"""First step from prices of the linear programme, which are nearly the best already."""
+"""First step from prices of the linear programme, which are already nearly optimal."""
 
 COMPARE_EVERY = 10
-"""Rounds between two that look for pairs to drop, where that takes long."""
+"""Rounds between two searches for pairs to drop, if these take long."""
 
 CONVERGED_STEP, CONVERGED_ALONE = 0.02, 0.005
-"""Steps shorter than this, where 1 is the step that would reach the plan's cost, hardly raise the bound: with clusters,
-after which a solver does better, and without."""
+"""Step lengths below which the bound hardly rises, with clusters (a solver is then better) and without; a step of 1 is
+that aimed at the cost of the incumbent plan."""
 
 MAX_LINKS, MAX_CUT_LINKS = 5_000_000, 20_000_000
-"""Tasks times pairs of class and task above which there are no clusters, and clusters times pairs up to which there are
-overlapping ones."""
+"""Number of tasks times pairs of class and task above which there are no clusters, and limit on the number of clusters
+times pairs for overlapping ones."""
 
 DECAYS_ALONE, DECAYS_WITHOUT_CLUSTERS = 4, 1
-"""Shortenings of the step after which clusters are added, and where there are none, cutting planes take over."""
+"""Numbers of shortened steps after which clusters are added or, if there are none, cutting planes take over."""
 
 LAST_GROUPS = 150
-"""Rounds whose groups the cutting planes begin with, the last ones."""
+"""Number of last rounds whose groups initialise the cutting planes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +83,7 @@ class Relaxed:
     group : ndarray of int, shape (p,)
         Agents of each pair in the cheapest groups of tasks.
     excess : ndarray, shape (p,) or (0,)
-        How much more the best group with an agent of the pair costs, or less than that.
+        Lower bound on the extra cost of the best group with an agent of the pair.
     cluster_group : ndarray of int, shape (e,)
         Agents of each entry in the cheapest groups of clusters.
     """
@@ -95,20 +95,20 @@ class Relaxed:
 
 
 class LagrangianBound:
-    """An ascent on dual prices; ``bound`` is proven all the while.
+    """A subgradient ascent on dual prices; ``bound`` is proven at any time.
 
     Parameters
     ----------
     model : EnergyModel
     task_distance : ndarray, shape (t, t)
-        How far tasks are from each other.
+        Distances between tasks.
     price : ndarray, shape (k,)
-        Of one agent of each class, to begin with.
+        Initial price of an agent of each class.
 
     Attributes
     ----------
     bound : float
-        No plan costs less; ``inf`` if no plan is better than the one at hand.
+        Lower bound on the cost of all plans; ``inf`` if no plan is better than the incumbent.
     kept : ndarray of bool, shape (p,)
         Pairs that have not been dropped.
     """
@@ -120,7 +120,7 @@ class LagrangianBound:
         links = len(model.need) * len(model.class_of_pair)
         self._cut_member = np.zeros((0, len(model.need)), dtype=bool)
         if model.ability is not None and len(model.need) > 3 and links <= MAX_LINKS:
-            if self.may_be_cut:  # then prices that clusters pay would only converge more slowly than their cuts
+            if self.may_be_cut:  # prices of clusters would converge more slowly than their cuts
                 self._cut_member = overlapping_clusters(task_distance, MAX_CUT_LINKS // len(model.class_of_pair))
             else:
                 self._member = cluster_tasks(task_distance)
@@ -140,14 +140,14 @@ class LagrangianBound:
 
     @property
     def converged(self) -> bool:
-        """Whether steps have become so short that the bound hardly rises any more."""
+        """Whether steps are so short that the bound hardly rises any more."""
         if self._member is None:
             return self._step < CONVERGED_ALONE
         return self._step < CONVERGED_STEP and self._clusters is not None
 
     @property
     def is_rising_slowly(self) -> bool:
-        """Whether a solver may soon do better; hardly where sums of weights are limited, which clusters make use of."""
+        """Whether a solver may soon do better; hardly if sums of weights are limited, which clusters exploit."""
         return self._clusters is not None and bool(self._model.max_weight[0] < 0)
 
     @property
@@ -157,16 +157,16 @@ class LagrangianBound:
 
     @property
     def is_nearly_optimal(self) -> bool:
-        """Whether prices are so good that cutting planes raise the bound faster."""
+        """Whether prices are good enough for cutting planes to raise the bound faster."""
         return self._decays >= DECAYS_WITHOUT_CLUSTERS if self._member is None else self.converged
 
     def cutting_planes(self, plan: WholeArray, should_stop: Callable[[], bool]) -> CuttingPlanes:
-        """Return an ascent that goes on from here, given the agents of each pair of a plan, shape (p,)."""
+        """Return the cutting-plane method initialised from here and from a plan, given by agents of each pair, (p,)."""
         groups = [plan[self.kept], *self._groups]
         return CuttingPlanes(self._model, self._cut_member, self._price, groups, should_stop)
 
     def ascend(self, rounds: int, cost: float) -> None:
-        """Change prices `rounds` times, given the cost of a plan at hand."""
+        """Update prices `rounds` times, given the cost of the incumbent plan."""
         for _ in range(rounds):
             if self.bound >= cost * (1 - 1e-12):
                 return
@@ -175,7 +175,7 @@ class LagrangianBound:
     def _round(self, cost: float) -> None:
         relaxed = self._solve()
         self._rounds += 1
-        if not np.isfinite(relaxed.value):  # the pairs kept allow no plan, so none is better than the one at hand
+        if not np.isfinite(relaxed.value):  # the kept pairs allow no plan, so the incumbent is optimal
             self.bound, self._step = (self.bound if self.kept.all() else np.inf), 0.0
             return
         if len(relaxed.excess):
@@ -199,7 +199,7 @@ class LagrangianBound:
             price += clusters.link @ self._cluster_price
             cluster_group, _, cluster_cost = solve_subproblems(clusters.model, -self._cluster_price, compare=False)
             value += cluster_cost
-        # where sums of weights are whole and not limited, the excess takes much longer than the groups
+        # for integer weights without a limit, the excess takes much longer than the groups
         compare = self._rounds % COMPARE_EVERY == 0 or bool(model.max_weight[0] >= 0) or not model.is_whole
         group, excess, task_cost = solve_subproblems(model, price, compare=compare)
         return Relaxed(value + task_cost, group, excess, cluster_group)
@@ -210,7 +210,7 @@ class LagrangianBound:
         used = np.bincount(model.class_of_pair, relaxed.group, len(model.count)).astype(np.int64)
         slope = _subgradient(used, model, self._price)
         cluster_slope = np.zeros(0) if clusters is None else clusters.link.T @ relaxed.group - relaxed.cluster_group
-        if not (slope.any() or cluster_slope.any()):  # the largest value; on a fading direction prices would grow
+        if not (slope.any() or cluster_slope.any()):  # the maximum; along the old direction prices would diverge
             self._step = 0.0
             return
         direction = slope + deflection * self._direction[0]
@@ -232,7 +232,7 @@ class LagrangianBound:
         return BRIEF if self._clusters is None else CLUSTERED
 
     def _note(self, value: float) -> None:
-        """Keep the best bound; shorten steps where it has not risen for long."""
+        """Record a bound; shorten steps if the best one has not risen for long."""
         self._rounds_without_rise += 1
         if value > self.bound * (1 + 1e-7):
             self._rounds_without_rise = 0
@@ -242,7 +242,7 @@ class LagrangianBound:
             self._decays += 1
 
     def _shrink(self, *, clusters: bool) -> None:
-        """Leave out the pairs that no better plan has, and build the clusters anew, with their last prices."""
+        """Drop the pairs that no better plan uses, and rebuild the clusters with their last prices."""
         stay = ~self._dropped
         self._groups.clear()
         self.kept[self.kept] = stay
@@ -259,7 +259,7 @@ class LagrangianBound:
 
 
 def _subgradient(used: WholeArray, model: EnergyModel, price: FloatArray) -> FloatArray:
-    """How many agents of each class are used beyond those there are, or must be, at this price, shape (k,)."""
+    """Return used agents of each class minus the limit that its price is for, shape (k,); at price 0, the violation."""
     above, below = used - model.count, used - model.min_agents
     unpriced: FloatArray = np.maximum(above, 0.0) + np.minimum(below, 0.0)
     return np.where(price > 0, above, np.where(price < 0, below, unpriced))

@@ -1,4 +1,4 @@
-"""Prices of the classes of agents by a linear programme of single agents: where the Lagrangian relaxation begins."""
+"""Initial prices of the Lagrangian relaxation by a linear programme of single agents."""
 
 import numpy as np
 from scipy.optimize import linprog
@@ -8,23 +8,23 @@ from alloc.allocators.exact.demand import Demand
 from alloc.problems.instance import FloatArray
 
 MAX_PAIRS = 30_000
-"""Pairs of class and task above which the programme takes too long."""
+"""Number of pairs of class and task above which the programme takes too long."""
 
 
 def class_prices(demand: Demand, cost: FloatArray, seconds: float) -> FloatArray:
-    """Return what one more agent of each class saves, shape (k,); zeros where the programme is not solved in time.
+    """Return the saving by one more agent of each class, shape (k,); zeros if the programme is not solved in time.
 
     Parameters
     ----------
     demand : Demand
     cost : ndarray, shape (p,)
-        Of one agent of each pair.
+        Cost of one agent of each pair.
     seconds : float
         Time limit.
     """
     pairs, tasks, classes = len(cost), len(demand.need), len(demand.count)
     if demand.spare < demand.ability.max() or pairs > MAX_PAIRS or seconds <= 0:
-        return np.zeros(classes)  # where nearly all agents must work, prices of any sign count
+        return np.zeros(classes)  # if nearly all agents must work, prices may have any sign
     columns = np.arange(pairs)
     part = demand.weight / demand.need[demand.task_of_pair]
     share = csr_array((-part, (demand.task_of_pair, columns)), shape=(tasks, pairs))

@@ -1,13 +1,13 @@
-"""Pairwise repartition on energy: assign the agents of two tasks to these tasks anew, in the best way of all; compiled.
+"""Pairwise repartition on energy: optimal reassignment of the agents of two tasks to these tasks, compiled.
 
-A very large neighbourhood. Which of their agents two tasks get each is a knapsack: exact by dynamic programming, in
-microseconds where needs are small whole numbers. So are a task and the idle agents. A plan that no such step improves
-is perturbed: around one task, distances get noise for one descent; the result is kept if it is better, or by the rule
-of annealing.
+A very large-scale neighbourhood: the partition of the agents of two tasks, or of a task and the idle agents, is a
+knapsack, solved exactly by dynamic programming in microseconds if needs are small integers. A plan that no such step
+improves is perturbed: distances around one task get noise for one descent, and the result is accepted if it is better,
+or by the annealing rule.
 
-The exchanges of `heuristic.local_search` are much the same neighbourhood. In the place of this one they were no better:
-on the paper's scenario 1, in 3 s on two threads of a busy machine, three of ten seeds took 1.0, 1.4 and 2.4 % more
-energy, none markedly less; on scenarios 2 to 4 either came out ahead, by 1.1 % at most.
+The exchanges of `heuristic.local_search` are a similar neighbourhood. Used instead, they were no better: in the paper's
+scenario 1, in 3 s on two threads of a busy machine, three of ten seeds took 1.0, 1.4 and 2.4 % more energy, and none
+markedly less; in scenarios 2 to 4 either was ahead, by at most 1.1 %.
 
 References
 ----------
@@ -29,9 +29,9 @@ Mask = NDArray[np.bool_]
 def repartition_pair(
     a: int, b: int, task: WholeArray, weight: WholeArray, distance: FloatArray, need: WholeArray, noise: FloatArray
 ) -> bool:
-    """Assign the agents of tasks `a` and `b` to the two at the least cost; return whether that changed anything.
+    """Reassign the agents of tasks `a` and `b` between the two at the least cost; return whether anything changed.
 
-    Task number ``len(need) - 1`` stands for idleness: it needs nothing. Distances are ``inf`` where an agent cannot go.
+    Task ``len(need) - 1`` stands for idle agents and needs nothing. Distances are ``inf`` out of reach.
     """
     if need[a] > need[b]:  # the smaller table
         a, b = b, a
@@ -77,14 +77,14 @@ def repartition_pair(
 def collect_pair(
     a: int, b: int, task: WholeArray, weight: WholeArray, distance: FloatArray, need: WholeArray, pool: WholeArray
 ) -> tuple[int, int, int]:
-    """Write the agents of the two tasks that can go to either to `pool`.
+    """Write the agents of the two tasks that can reach both to `pool`.
 
     Returns
     -------
     int
-        How many they are.
+        Number of these agents.
     int, int
-        Least and largest sum of their weights on `a` that leaves `b` what it needs; the largest is below the least if
+        Smallest and largest sum of their weights on `a` that meets both needs; the largest is below the smallest if
         there is none.
     """
     free, total, fixed, movable = 0, 0, 0, 0
@@ -115,7 +115,7 @@ def descend_pairs(
     rng: np.random.Generator,
     rounds: int,
 ) -> None:
-    """Repartition pair after pair, from a random one on, until no pair with a `stale` task improves."""
+    """Repartition pairs in cyclic order, from a random start, until no pair with a `stale` task improves."""
     for _ in range(rounds):
         now, again = stale.copy(), False
         for j in range(len(stale)):
@@ -133,7 +133,7 @@ def descend_pairs(
 
 @compiled
 def total_distance(task: WholeArray, distance: FloatArray) -> float:
-    """Return the sum of distances of all agents to their tasks."""
+    """Return the total distance of all agents to their tasks."""
     total = 0.0
     for i in range(len(task)):
         total += distance[i, task[i]]
@@ -162,16 +162,16 @@ def perturb(
     strength: float,
     temperature: float,
 ) -> None:
-    """Perturb and descend `rounds` times from `task`; `best` is the best plan met; both are changed in place.
+    """Perturb and descend `rounds` times from `task`; `best` is the best plan found; both are changed in place.
 
     Parameters
     ----------
     near : ndarray of int, shape (tasks, q)
         The nearest tasks of each task, itself first.
     noise : ndarray, shape (n, tasks + 1)
-        Zeros; so again at the end.
+        Scratch; zeros before and after.
     strength, temperature : float
-        Largest noise, and temperature of annealing, both in units of distance.
+        Largest noise, and annealing temperature, both in units of distance.
     """
     least, here = total_distance(best, distance), total_distance(task, distance)
     before, stale = task.copy(), np.zeros(len(need), dtype=np.bool_)

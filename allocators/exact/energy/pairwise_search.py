@@ -1,4 +1,4 @@
-"""Plans of less energy by pairwise repartition and annealing."""
+"""Search for plans of less energy by pairwise repartition and annealing."""
 
 from dataclasses import dataclass
 
@@ -14,21 +14,21 @@ from alloc.problems.bounds import scale_to_one, typical_distance
 from alloc.problems.instance import FloatArray, IntArray
 
 MAX_WORK = 100_000_000
-"""Cells of all tables that a round of prices, or a descent over all pairs of tasks, may fill: some 0.1 s."""
+"""Limit on the table cells of a round of prices, or of a descent over all pairs of tasks, about 0.1 s."""
 
 
 @dataclass(frozen=True)
 class Perturbation:
-    """How plans are perturbed.
+    """Parameters of perturbations.
 
     Attributes
     ----------
     around : int
-        Tasks perturbed at once, at most.
+        Largest number of tasks perturbed at once.
     partners : int
-        Nearest tasks that a task is paired with.
+        Number of nearest tasks with which a task is paired.
     strength, temperature : float
-        Largest noise, and temperature to begin with, as multiples of the mean distance of an agent.
+        Largest noise, and initial temperature, as multiples of the mean distance of an agent.
     """
 
     around: int = 8
@@ -38,19 +38,19 @@ class Perturbation:
 
 
 class PairwiseSearch:
-    """An annealed search over plans in which every task has what it needs, for less energy.
+    """An annealing search for less energy over plans that meet all needs.
 
     Parameters
     ----------
     task : ndarray of int, shape (n,)
-        Task of each agent to begin with, ``len(need)`` for idle ones.
+        Initial task of each agent, ``len(need)`` for idle ones.
     weight : ndarray of int, shape (n,)
-        What each agent adds to its task, whatever the task.
+        Contribution of each agent to any task.
     distance : ndarray, shape (n, t)
-        ``inf`` where an agent cannot go.
+        ``inf`` out of reach.
     need : ndarray of int, shape (t,)
     task_distance : ndarray, shape (t, t)
-        How far tasks are from each other; only near ones are perturbed together.
+        Distances between tasks; only nearby ones are perturbed together.
     seed : int
     perturbation : Perturbation
     """
@@ -82,11 +82,11 @@ class PairwiseSearch:
 
     @property
     def cost(self) -> float:
-        """Sum of distances of the best plan."""
+        """Total distance of the best plan."""
         return float(total_distance(self.best, self._distance)) / self._scale
 
     def descend(self) -> bool:
-        """Repartition all pairs of tasks once; return whether none can be improved any more."""
+        """Repartition all pairs of tasks once; return whether no pair can be improved any more."""
         descend_pairs(
             self._task, self._weight, self._distance, self._need, self._noise, self._pairs, self._stale, self._rng, 1
         )
@@ -94,7 +94,7 @@ class PairwiseSearch:
         return not self._stale.any()
 
     def adopt(self, task: IntArray) -> None:
-        """Go on from a better plan, given the task of each agent, if it is one with rounded weights too."""
+        """Continue from a better plan, given the task of each agent, if it is also feasible with rounded weights."""
         agents, done = np.arange(len(task)), np.bincount(task, self._weight, len(self._need))
         if (done < self._need).any() or not np.isfinite(self._all_distance[agents, task]).all():
             return
@@ -102,7 +102,7 @@ class PairwiseSearch:
         self._distance[agents, task] = self._all_distance[agents, task]
 
     def restrict(self, allowed: Mask) -> None:
-        """Send agents only where they are allowed, shape (n, t), or where they are now or in the best plan."""
+        """Restrict agents to the allowed tasks, shape (n, t), and their tasks in the present and the best plan."""
         allowed, agents = np.hstack([allowed, np.ones((len(allowed), 1), dtype=bool)]), np.arange(len(allowed))
         allowed[agents, self._task] = allowed[agents, self.best] = True
         self._distance = np.where(allowed, self._all_distance, np.inf)
@@ -110,7 +110,7 @@ class PairwiseSearch:
         self._pairs = self._all_pairs[(can.T @ can)[self._all_pairs[:, 0], self._all_pairs[:, 1]] > 0]
 
     def anneal(self, rounds: int, progress: float) -> None:
-        """Perturb and descend `rounds` times, `progress` being how far annealing is, from 0 to 1."""
+        """Perturb and descend `rounds` times at the given annealing progress, from 0 to 1."""
         unit = self.cost * self._scale / len(self._task) + 1e-300
         perturb(
             self._task,
@@ -129,7 +129,7 @@ class PairwiseSearch:
 
 
 def _pairs(partners: WholeArray, tasks: int) -> WholeArray:
-    """Pairs of tasks, shape (p, 2), and of each task with idleness."""
+    """Return the pairs of partner tasks, and of each task with idleness, shape (p, 2)."""
     one = np.repeat(np.arange(tasks), partners.shape[1])
     both = np.sort(np.column_stack([one, partners.ravel()]), axis=1)
     both = np.unique(both[both[:, 0] < both[:, 1]], axis=0)
@@ -140,7 +140,7 @@ def _pairs(partners: WholeArray, tasks: int) -> WholeArray:
 def begin_primal(
     instance: Instance, model: Model, demand: Demand, plan: Allocation, task_distance: FloatArray, seed: int
 ) -> PairwiseSearch | None:
-    """Start the search at `plan`; None where travel takes time, or its tables are too large."""
+    """Return the search started at `plan`; None if travel takes time, or its tables are too large."""
     if model.travel_time is not None:
         return None
     task = model.columns(plan)

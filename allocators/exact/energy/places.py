@@ -1,4 +1,4 @@
-"""Plans of less energy at the same completion times: agents alike change places, and agents not needed stay idle."""
+"""Plans of less energy at the same completion times: identical agents are exchanged, unneeded agents become idle."""
 
 from collections.abc import Callable
 
@@ -10,16 +10,16 @@ from alloc.problems import IDLE, Allocation, Instance, agent_classes
 from alloc.problems.instance import IntArray
 
 MAX_MATCHED = 400
-"""Agents alike that are matched with their tasks at once, some 10 ms; larger classes are cut into parts."""
+"""Largest number of identical agents matched with tasks at once, some 10 ms; larger classes are split."""
 
 
 def nearest_places(
     instance: Instance, allocation: Allocation, should_stop: Callable[[], bool] = lambda: False
 ) -> Allocation:
-    """Exchange agents alike but for their place so that their total cost is least: an assignment problem per class.
+    """Exchange agents that differ only in their place at the least total cost: an assignment problem per class.
 
-    By Crouse (2016), doi:10.1109/TAES.2016.140952, in scipy. Where travel takes time, agents at different places are
-    not alike, and the plan stays as it is.
+    Solved by scipy's implementation of Crouse (2016), doi:10.1109/TAES.2016.140952. If travel takes time, agents at
+    different places are not interchangeable, and the plan is returned unchanged.
     """
     task = allocation.task_of_agent.copy()
     if instance.has_travel_time:
@@ -36,7 +36,7 @@ def nearest_places(
 
 
 def _alike(instance: Instance) -> list[IntArray]:
-    """Agents of each class, those of large classes in parts."""
+    """Return the agents of each class, with large classes split."""
     classes = agent_classes(instance, by_place=False)
     order = np.argsort(classes.class_of_agent, kind="stable")
     whole = np.split(order, np.cumsum(classes.count)[:-1])
@@ -45,7 +45,7 @@ def _alike(instance: Instance) -> list[IntArray]:
 
 
 def without_idlers(model: Model, allocation: Allocation, time: float) -> Allocation:
-    """Leave out agents without whom their task is done by `time` all the same, the dearest first."""
+    """Make agents idle without whom their task is still done by `time`, the most expensive first."""
     table = model.classes.tally(allocation)
     share = model.shares(time)
     for column, task in enumerate(model.tasks.tolist()):

@@ -1,4 +1,4 @@
-"""The state that the phases of the energy stage pass along."""
+"""The shared state of the phases of the energy stage."""
 
 from dataclasses import dataclass
 
@@ -14,10 +14,10 @@ from alloc.allocators.exact.solver_model import is_repeatable
 from alloc.problems import Allocation, Objective
 
 STAGE_S = 60.0
-"""Seconds of which phases get their shares where there is no time limit, or a longer one."""
+"""Seconds to which the shares of phases refer without a time limit, or with a longer one."""
 
 LINEAR_SHARE = 0.1
-"""Share of the stage's time for a linear programme to begin with, at the most."""
+"""Largest share of the stage's time for the initial linear programme."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,19 +28,19 @@ class EnergyState:
     ----------
     search : Search
     model : Model
-        Classes told apart by place.
+        Classes that distinguish places.
     demand : Demand
         The constraints at the makespan.
     begin_s, until_s : float
         Seconds since the run began at which the stage began and must end; the latter ``inf`` without a time limit.
     repeatable : bool
-        Whether effort is counted and not timed.
+        Whether effort is counted rather than timed.
     primal_dual : PrimalDual or None
-        None where the solver is quick enough by itself, or neither side can be had.
+        None if the solver is fast enough by itself, or neither side is tractable.
     local_search : LocalSearchPhase or None
-        None where `primal_dual` finds plans without rounding, or the solver is quick enough by itself.
+        None if `primal_dual` finds plans without rounding, or the solver is fast enough by itself.
     travel : TravelPhase or None
-        None where travel takes no time, or `primal_dual` has no prices.
+        None if travel takes no time, or `primal_dual` has no prices.
     """
 
     search: Search
@@ -65,7 +65,7 @@ class EnergyState:
             plan = search.best.allocation
             both = PrimalDual(search.instance, model, demand, plan, search.seed, seconds, search.should_stop)
             primal_dual = None if both.is_empty else both
-        # the primal side rounds weights, and so has few plans at the very least makespan where they are no integers
+        # with non-integer weights, which it rounds, the primal side has few plans at the least makespan
         enough = primal_dual is not None and primal_dual.finds_plans and demand.integral
         if len(demand.class_of_pair) > FEW_PAIRS and not enough:
             local_search = LocalSearchPhase(search, Objective.MAKESPAN_ENERGY, until_s, search.makespan_limit)
@@ -86,7 +86,7 @@ class EnergyState:
 
     @property
     def spare_threads(self) -> int:
-        """Threads that neither the calling one nor the local search beside it takes."""
+        """Number of threads used neither by the caller nor by parallel local search."""
         beside = self.local_search is not None and self.local_search.is_beside
         return max(0, self.search.threads - 1 - beside)
 
@@ -98,16 +98,16 @@ class EnergyState:
 
     @property
     def stage_s(self) -> float:
-        """Seconds of which phases get their shares."""
+        """Seconds to which the shares of phases refer."""
         return min(STAGE_S, self.until_s - self.begin_s)
 
     @property
     def progress(self) -> float:
-        """How much of the stage's time has passed; may exceed 1."""
+        """Share of the stage's time that has passed; may exceed 1."""
         return (self.search.elapsed_s - self.begin_s) / self.stage_s if self.stage_s > 0 else 1.0
 
     def submit(self, plan: Allocation | None) -> None:
-        """Submit a plan of `primal_dual`, if there is a new one, and pass it the best plan."""
+        """Submit a plan of `primal_dual`, if it is new, and pass the best plan to `primal_dual`."""
         if plan is not None:
             self.search.submit(plan)
         if self.local_search is not None:

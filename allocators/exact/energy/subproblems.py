@@ -13,23 +13,23 @@ from alloc.problems.instance import FloatArray
 def solve_subproblems(
     model: EnergyModel, price: FloatArray, *, compare: bool = True
 ) -> tuple[WholeArray, FloatArray, float]:
-    """Find the cheapest group of every task, or cluster, on its own.
+    """Find the cheapest group of every task, or cluster, separately.
 
     Parameters
     ----------
     price : ndarray, shape (p,)
-        What one agent of each pair costs.
+        Cost of one agent of each pair.
     compare : bool
-        Whether the excess is wanted.
+        Whether to compute the excess.
 
     Returns
     -------
     ndarray of int, shape (p,)
         Agents of each pair in these groups.
     ndarray, shape (p,) or (0,)
-        Excess: how much dearer the best group with an agent of the pair is, or less than that.
+        Excess: a lower bound on the extra cost of the best group with an agent of the pair.
     float
-        What all groups cost, or less than that; ``inf`` if a task has none, the arrays then meaning nothing.
+        Total cost of all groups, or a lower bound on it; ``inf`` if a task has none, and the arrays are then undefined.
     """
     group, excess = np.zeros(len(price), dtype=np.int64), np.zeros(len(price) if compare else 0)
     if model.is_whole:
@@ -51,7 +51,7 @@ def solve_in_floats(
     group: WholeArray,
     excess: FloatArray,
 ) -> float:
-    """Do the work of `solve_subproblems` where weights and needs are floats."""
+    """Implement `solve_subproblems` for weights and needs that are floats."""
     total, states = 0.0, room_for_states(MAX_STATES)
     for j in range(len(need)):
         a, b = first[j], first[j + 1]
@@ -73,7 +73,7 @@ def solve_all(
     group: WholeArray,
     excess: FloatArray,
 ) -> float:
-    """Do the work of `solve_subproblems`, filling `group` and `excess`; an empty `excess` is left out."""
+    """Implement `solve_subproblems` for integers: fill `group` and, unless it is empty, `excess`."""
     total, compare = 0.0, len(excess) > 0
     for j in range(len(need)):
         a, b = first[j], first[j + 1]
@@ -98,7 +98,7 @@ def solve_one(
     """Write the cheapest group of one task and return its cost, ``inf`` if there is none."""
     exact, pairs = max_weight >= 0, len(weight)
     if not compare and need > 0 and (exact or (pairs > 0 and price.min() >= 0)):
-        most = max_weight if exact else need + weight.max() - 1  # without an agent that can be spared
+        most = max_weight if exact else need + weight.max() - 1  # in a minimal group
         paid, cheapest = cheapest_by_core(weight, price, copies, need, most)
         for p in range(pairs):
             group[p] = cheapest[p]

@@ -1,4 +1,4 @@
-"""Rounds of work by slices of time."""
+"""Adaptive numbers of rounds per time slice."""
 
 import time
 from collections.abc import Callable
@@ -6,23 +6,23 @@ from collections.abc import Callable
 import numpy as np
 
 SLICE_S = 0.01
-"""Time of each side in one call of `PrimalDual.run`."""
+"""Time slice of each side in one call of `PrimalDual.run`, in seconds."""
 
 
 class Timer:
-    """Adapts the number of rounds to a slice of time, by how long the last ones took.
+    """Adapts the number of rounds to a time slice by the duration of the last ones.
 
     Attributes
     ----------
     spent_s : float
-        Time of all rounds so far.
+        Total time of all rounds so far.
     """
 
     def __init__(self) -> None:
         self._rounds, self.spent_s = 1, 0.0
 
     def run(self, work: Callable[[int], None]) -> None:
-        """Do as many rounds as fit."""
+        """Run as many rounds as fit into a time slice."""
         begin = time.monotonic()
         work(self._rounds)
         took = max(time.monotonic() - begin, 1e-5)

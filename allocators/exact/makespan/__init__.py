@@ -1,1 +1,1 @@
-"""The least makespan: plans and bounds from bisection on T."""
+"""The makespan stage: plans and lower bounds, by bisection on the makespan T."""

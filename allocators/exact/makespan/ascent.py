@@ -1,9 +1,9 @@
-"""The configuration bound by a subgradient method, for where column generation takes too long.
+"""The configuration bound by a subgradient method, for instances where column generation takes too long.
 
-At first each agent costs the value of its work on its best task. From there prices follow a deflected subgradient:
-agents that the cheapest groups of all tasks use more than once get dearer, unused ones cheaper. As soon as the groups
-together cost more than all agents, T is proven impossible, and the next larger T comes. Once prices have converged
-below a T that stays possible, it starts again halfway to that T, with more patience.
+Initially, each agent costs the value of its work on its best task. Prices then follow a deflected subgradient: agents
+that the cheapest groups of all tasks use more than once become dearer, unused ones cheaper. As soon as the groups
+together cost more than all agents, T is proven infeasible and increased. Once prices have converged at a T that is not
+excluded, the method restarts halfway to that T, with more patience.
 
 References
 ----------
@@ -21,48 +21,48 @@ from alloc.allocators.runtime.compiled import compiled
 from alloc.problems.instance import FloatArray
 
 GRID = 2**40
-"""Steps into which the need of a task is divided: weights are rounded up to them."""
+"""Number of steps into which the need of a task is divided; weights are rounded up to them."""
 
 MAX_PAIRS = 1_000_000
-"""Pairs of class and task above which there is no such bound."""
+"""Number of pairs of class and task above which the bound is not computed."""
 
 FIRST_LEVEL, NEXT_LEVEL, LAST_LEVEL = 1e-2, 5e-4, 1e-5
-"""How much above its best value the subgradient method wants theta: at first, after a new start, and at the end."""
+"""Target increase of theta above its best value: initially, after a restart, and at the end."""
 
 PATIENCE, MAX_PATIENCE = 12, 100
-"""Rounds without progress after which it wants half as much; doubled with each start up to the largest."""
+"""Rounds without progress after which that target is halved; doubled at each restart, up to the maximum."""
 
 DEFLECTION = 0.5
-"""Part of the last direction that is added to the subgradient."""
+"""Share of the last direction that is added to the subgradient."""
 
 LEAST_RISE = 1e-6
-"""Rise of theta that counts as progress."""
+"""Smallest increase of theta that counts as progress."""
 
 SMALL_RISE, LARGEST_RISE = 0.005, 0.1
-"""Relative rise of T up to which all that theta is above 1 counts, and the largest at once: of more, a quarter counts,
-as theta falls by more than T rises where travel takes long."""
+"""Caps on the relative increase of T: the larger of theta - 1 up to the first, and a quarter of it up to the second, as
+theta falls faster than T rises if travel takes long."""
 
 
 class ConfigurationAscent:
-    """Prices of agents that rise to the bound.
+    """Subgradient ascent on the prices of agents, for lower bounds on the makespan.
 
     Parameters
     ----------
     model : Model
         All of its tasks must be served.
     low : float
-        Proven bound in hours.
+        Proven lower bound in hours.
     price : ndarray, shape (t,), optional
-        Value of a unit of each workload to begin with; all the same by default.
+        Initial value of a unit of each workload; all equal by default.
 
     Attributes
     ----------
     is_tractable : bool
-        Whether its tables are of a size that can be computed.
+        Whether its tables are small enough.
     proven : float
-        The largest T that has been proven impossible; 0 at first.
+        The largest T proven infeasible so far, initially 0.
     task_price : ndarray, shape (t,)
-        Cost of the cheapest group of each task per unit of its workload, at the best prices so far.
+        Cost of each task's cheapest group per unit of its workload, at the best prices so far.
     """
 
     def __init__(self, model: Model, low: float, price: FloatArray | None = None) -> None:
@@ -82,12 +82,12 @@ class ConfigurationAscent:
         return self._patience > MAX_PATIENCE
 
     def round(self, low: float) -> bool:
-        """Solve the knapsacks at the current prices, and change these; return whether a T was proven impossible.
+        """Solve the knapsacks at the current prices and update these; return whether a T was proven infeasible.
 
         Parameters
         ----------
         low : float
-            No T below it matters.
+            Proven lower bound; smaller T are of no interest.
         """
         if self._time < low:
             self._time, self._best = low, 0.0
@@ -114,7 +114,7 @@ class ConfigurationAscent:
         return is_excluded
 
     def _restart(self) -> None:
-        """Go back to the best prices: for a smaller rise of theta, or at last for a smaller T, with more patience."""
+        """Return to the best prices, with a smaller target, or finally with a smaller T and more patience."""
         self._price, self._direction = self._best_price, np.zeros(len(self._count))
         self._level, self._stale = self._level / 2, 0
         if self._level < LAST_LEVEL:
@@ -122,7 +122,7 @@ class ConfigurationAscent:
             self._time, self._best = (max(self.proven, self._time / 2) + self._time) / 2, 0.0
 
     def _change_prices(self, subgradient: FloatArray, rise: float) -> None:
-        """Step along the subgradient, deflected by the last direction, to where theta may have risen by `rise`."""
+        """Step along the deflected subgradient, with a step size aimed at an increase of theta by `rise`."""
         self._direction = subgradient + DEFLECTION * self._direction
         norm = float(self._direction @ self._direction)
         price = np.maximum(0.0, self._price + rise / max(norm, 1.0) * self._direction)
@@ -131,12 +131,12 @@ class ConfigurationAscent:
 
 
 def _in_steps(model: Model, time: float) -> tuple[FloatArray, FloatArray]:
-    """Return weights, shape (t, k), and needs, shape (t,), such that what is impossible so is impossible indeed.
+    """Return rounded weights, shape (t, k), and needs, shape (t,), whose infeasibility implies that of T.
 
-    They are whole numbers of which floats hold exactly the sums of all that a task has a use for.
+    They are integers, small enough for floats to represent all relevant sums exactly.
     """
     weight, need = model.uncapped(time)
-    with np.errstate(over="ignore"):  # an agent may bring far more than a task needs
+    with np.errstate(over="ignore"):  # an agent may do far more than a task needs
         steps = np.minimum(np.ceil(weight / (need / GRID)), GRID)
     return np.ascontiguousarray(steps.T), np.full(len(need), float(GRID))
 
@@ -175,6 +175,6 @@ def cheapest_groups(
 
 
 def compile_loops() -> None:
-    """Compile the loop, or read it from the cache, so that no run waits for it."""
+    """Compile the loop, or load it from the cache, so that it does not delay a run."""
     ones = np.ones(2)
     cheapest_groups(np.ones((1, 2)), ones, np.ones(2, dtype=np.int64), ones[:1], np.zeros(2))

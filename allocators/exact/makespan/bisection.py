@@ -1,4 +1,4 @@
-"""The least makespan: quick plans and bounds, then a bisection on T."""
+"""The makespan stage: quick plans and bounds, then a bisection on T."""
 
 import numpy as np
 
@@ -12,35 +12,35 @@ from alloc.allocators.exact.model import FEW_PAIRS
 from alloc.allocators.exact.solver_model import Solver, Verdict
 
 SHARES = ((0.02, 0.02, 0.03), (0.07, 0.05, 0.08), (0.2, 0.15, 0.2))
-"""Shares of the time of repartitions, configurations and local search, which take turns before the solver."""
+"""Time shares of repartitions, configurations and local search, which alternate before the solver runs."""
 
 PROBE_SHARE = 0.1
-"""Share of the time of a probe; as much goes to plans after one that stayed open."""
+"""Time share of a probe, and of the search for plans after a probe without verdict."""
 
 
 def least_makespan(
     search: Search, solver: Solver, min_served: int, until_s: float, patience: float = np.inf, *, descent: bool
 ) -> bool:
-    """Narrow the gap between plans and bounds until it is closed or time is up; both go to `search`.
+    """Narrow the gap between plans and bounds until it is closed or time is up, and submit both to `search`.
 
     Parameters
     ----------
     search : Search
-        There is a plan already.
+        The run, which must have a plan.
     solver : Solver
     min_served : int
-        How many tasks are to be served.
+        Number of tasks to be served.
     until_s : float
         Seconds since the run began at which this must end.
     patience : float
-        Time without a faster plan, as a multiple of the time until the fastest was found, after which this ends.
+        Time without a faster plan, as a multiple of the time until the fastest was found, after which the stage ends.
     descent : bool
-        Whether plans are looked for without the solver first.
+        Whether to search for plans before the solver runs.
 
     Returns
     -------
     bool
-        Whether more time would not help.
+        Whether more time would be of no use.
     """
     state = MakespanState.begin(search, min_served, until_s, patience, descent=descent)
     is_plain = search.instance.reach.is_complete and state.model.unit is not None
@@ -55,7 +55,7 @@ def least_makespan(
 
 
 def take_turns(state: MakespanState) -> None:
-    """Find plans and bounds that often meet, so that no solver is needed."""
+    """Improve plans and bounds by turns; they often meet, so that no solver is needed."""
     for plans, bounds, local in SHARES if state.descent and len(state.model.class_of_pair) > FEW_PAIRS else ():
         state.search_locally(local)
         search_repartitions(state, plans + (1 - state.local_weight) * local)
@@ -63,10 +63,10 @@ def take_turns(state: MakespanState) -> None:
 
 
 def bisect(state: MakespanState, solver: Solver) -> None:
-    """Probe one T after the other between the proven bound and the fastest plan.
+    """Probe a sequence of T between the proven bound and the fastest plan.
 
-    The lower bound is probed first, as it is often the optimum. A probe without a verdict raises the lower end of the
-    bisection but proves nothing; it is repeated with more time once nothing else is left.
+    The lower bound is probed first, as it is often optimal. A probe without verdict raises the lower end of the
+    bisection but proves nothing; it is repeated with more time once no other probe is left.
     """
     probe = Probe(state.lower, state.share_s(PROBE_SHARE))
     while not state.ended:
@@ -86,7 +86,7 @@ def bisect(state: MakespanState, solver: Solver) -> None:
 
 
 def _next_probe(state: MakespanState, last: Verdict) -> Probe:
-    """Choose the next T, given the verdict on the last one."""
+    """Return the next probe, given the verdict on the last one."""
     upper, floor, seconds = state.upper, max(state.lower, state.unresolved), state.share_s(PROBE_SHARE)
     if state.would_prove(floor) and state.unresolved > state.lower:
         state.unresolved = 0.0

@@ -1,13 +1,13 @@
-"""The configuration linear programme: which groups of agents tasks would take if groups could be mixed.
+"""The configuration linear programme, a relaxation in which each task takes a convex combination of groups of agents.
 
-At a fixed T, a *group* is of use to a task if its agents do the work by then. The programme mixes groups for tasks,
-weights summing to 1, such that the class of agents in greatest demand is used as little as possible:
+At a fixed T, a *group* suits a task if its agents complete the task by then. The programme chooses convex combinations
+of groups such that the largest relative use of a class of agents is least:
 
     minimise theta:  sum_p x_jp = 1 for each task j,   sum_jp agents_pk x_jp <= theta count_k for each class k.
 
-If theta > 1, there is no plan. Groups are found as they are needed, by a knapsack at the dual prices of the classes
-(column generation). For any prices >= 0, theta is at least what the cheapest groups of all tasks cost together, over
-what all agents cost together: that comparison, in whole numbers, is the proof; the programme only finds the prices.
+If theta > 1, there is no plan. Groups are generated as needed by a knapsack at the dual prices of the classes (column
+generation). For any prices >= 0, theta is at least the total cost of the cheapest groups of all tasks divided by the
+total cost of all agents: this comparison, in integers, is the proof, for which the programme only provides prices.
 
 References
 ----------
@@ -26,40 +26,40 @@ from alloc.allocators.exact.model import Model
 from alloc.problems.instance import FloatArray, IntArray
 
 MAX_NEED = 20_000
-"""Largest need in units up to which needs are kept as they are."""
+"""Largest integer need up to which needs are not rounded."""
 
 GRID, FINE_GRID = 2**13, 2**17
-"""Steps of the largest need otherwise, at first and in the end: weights are rounded up to them, needs down."""
+"""Number of steps of the largest need otherwise, at first and at the end: weights are rounded up, needs down."""
 
 MAX_CELLS = 30_000_000
-"""Agents times steps times tables above which no prices are computed."""
+"""Number of agents times steps times tables above which no prices are computed."""
 
 PRICE_SUM = 2.0**40
-"""What all agents cost together, about; prices are whole, so that sums of them are exact."""
+"""Approximate total cost of all agents; prices are integers, so that their sums are exact."""
 
 SMOOTHING = 0.6
-"""Part of the best prices so far in those that are tried next."""
+"""Weight of the best prices so far in the next trial prices (stabilisation)."""
 
 WHOLE, ROUNDED = 1e-8, 0.1
-"""Relative precision of T where needs are whole, and otherwise, as a part of a step."""
+"""Relative precision of T for integer needs, and otherwise as a share of a step."""
 
 MAX_REUSED = 2000
-"""Groups found at one T that are offered at the next, the latest ones."""
+"""Number of the latest groups that are reused at the next T."""
 
 
 @dataclass(frozen=True, eq=False)
 class DualPrices:
-    """Prices of the classes, and what they prove.
+    """Prices of the classes, and the bound that they prove.
 
     Attributes
     ----------
     price : ndarray, shape (k,)
-        Whole numbers >= 0.
+        Integers >= 0.
     theta : float
-        Cost of the cheapest groups of all tasks over that of all agents; above 1 it proves T impossible. ``inf`` if all
-        agents are too few for a task.
+        Cost of the cheapest groups of all tasks divided by that of all agents; above 1 it proves T infeasible. ``inf``
+        if all agents together cannot do some task.
     converged : bool
-        Whether the programme is solved as far as was asked for.
+        Whether the programme is solved to the requested extent.
     """
 
     price: FloatArray
@@ -68,25 +68,25 @@ class DualPrices:
 
 
 class ConfigurationProgramme:
-    """Proves by dual prices which T are impossible; keeps the groups found at one T for the next.
+    """Proves T infeasible by dual prices; reuses the groups found at one T at the next.
 
     Parameters
     ----------
     model : Model
         All of its tasks must be served.
     low : float
-        Hours; no smaller T will be asked for.
+        Hours; lower bound on all T that will be asked for.
     grid : int
-        Steps of the largest need where these are no whole numbers.
+        Number of steps of the largest need if needs are not integers.
 
     Attributes
     ----------
     count : ndarray of int64, shape (k,)
         Agents in each class.
     is_tractable : bool
-        Whether its tables are of a size that can be computed.
+        Whether its tables are small enough.
     precision : float
-        Relative difference of T up to which no further solution is sought.
+        Relative precision of T.
     """
 
     def __init__(self, model: Model, low: float, grid: int = GRID) -> None:
@@ -109,7 +109,7 @@ class ConfigurationProgramme:
         self._known: list[WholeArray] = []
 
     def refined(self, low: float) -> "ConfigurationProgramme | None":
-        """Return the programme in the finest steps that can be computed, or None where there are no finer ones."""
+        """Return the programme with the finest tractable steps; None if they are not finer than the present ones."""
         if self.precision == WHOLE or self._grid == FINE_GRID:
             return None
         grid = FINE_GRID
@@ -122,7 +122,7 @@ class ConfigurationProgramme:
         return None
 
     def needs(self, time: float) -> list[TaskNeeds]:
-        """Return the needs at T = `time`, rounded such that what is impossible so is impossible indeed."""
+        """Return the needs at T = `time`, rounded such that their infeasibility implies that of T."""
         weight, need = self._model.uncapped(time)
         return [
             _in_steps(tasks, weight[:, tasks[0]], need[tasks], step)
@@ -130,7 +130,7 @@ class ConfigurationProgramme:
         ]
 
     def largest_infeasible(self, prices: DualPrices, low: float, high: float) -> float:
-        """Return the largest T from `low` to `high`, or close to it, that these prices prove impossible, else `low`."""
+        """Return (nearly) the largest T from `low` to `high` that these prices prove infeasible, or `low`."""
         if self._model.travel_time is not None:
             return low
         total = float(prices.price @ self.count)
@@ -150,17 +150,17 @@ class ConfigurationProgramme:
         return proven
 
     def dual_prices(self, time: float, should_stop: Callable[[], bool], *, converge: bool = False) -> DualPrices | None:
-        """Solve the programme at T = `time` by column generation, as far as it takes to see whether T is impossible.
+        """Solve the programme at T = `time` by column generation, until it is clear whether T is infeasible.
 
         Parameters
         ----------
         converge : bool
-            Whether to go on to the end where it is not.
+            Whether to solve to optimality if it is not.
 
         Returns
         -------
         DualPrices or None
-            The best ones found; None if it was stopped before there were any.
+            The best ones found; None if stopped before there were any.
         """
         tasks = self.needs(time)
         master = RestrictedMaster(tasks, self.count)
@@ -191,13 +191,13 @@ class ConfigurationProgramme:
         return self._table(needs, price)[0]
 
     def _first_price(self, tasks: list[TaskNeeds]) -> FloatArray:
-        """Price every class by the largest weight of one of its agents, all agents costing 1 together."""
+        """Return prices proportional to the largest weight of each class, with total cost 1 of all agents."""
         usable = np.any([needs.weight > 0 for needs in tasks], axis=0)
         typical = np.maximum.reduce([np.minimum(needs.weight, needs.need.max()) for needs in tasks]).astype(float)
         return np.where(usable, typical, 0.0) / max(1e-300, float(typical @ self.count))
 
     def solve_pricing(self, tasks: list[TaskNeeds], price: FloatArray) -> tuple[DualPrices, list[Table]]:
-        """Find the cheapest groups at `price` made whole: what these prove, and the tables of the groups."""
+        """Find the cheapest groups at `price`, rounded to integers; return the bound they prove, and their tables."""
         whole: FloatArray = np.round(np.maximum(0.0, price) * PRICE_SUM)
         total, cost = float(whole @ self.count), 0.0
         tables = [self._table(needs, whole) for needs in tasks]
@@ -205,7 +205,7 @@ class ConfigurationProgramme:
             cost += float(table[0][needs.need].sum())
         if not np.isfinite(cost):
             return DualPrices(whole, np.inf), tables
-        theta = cost / total if cost != total else 1.0  # not merely close to 1: the sums of whole numbers decide
+        theta = cost / total if cost != total else 1.0  # exact: the integer sums decide, not their rounded ratio
         return DualPrices(whole, max(theta, np.nextafter(1.0, 2.0)) if cost > total else min(theta, 1.0)), tables
 
     def _table(self, needs: TaskNeeds, price: FloatArray) -> Table:
@@ -213,7 +213,7 @@ class ConfigurationProgramme:
 
 
 def _in_steps(tasks: IntArray, weight: FloatArray, need: FloatArray, step: float) -> TaskNeeds:
-    """Round weights and needs, unless they are whole already; as arrays that loops take."""
+    """Round weights and needs to steps, unless they are integers; return them as arrays for compiled loops."""
     if step == 1.0:
         return TaskNeeds(tasks, np.ascontiguousarray(weight.astype(np.int64)), need.astype(np.int64))
     whole_need = np.maximum(1, np.floor(need / step * (1 - 1e-12))).astype(np.int64)

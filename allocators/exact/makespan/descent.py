@@ -1,7 +1,7 @@
-"""A quick plan for a given T: the task done least gets another agent, alone or in a swap, while that helps.
+"""A descent to a plan for a given T: moves or swaps an agent to the task with the largest shortfall while that helps.
 
-Helps means: lessens the sum over tasks of the squared shortfall. On the paper's scenarios this reaches T = 1 in
-milliseconds, from the greedy allocation and without a solver.
+The objective is the sum over tasks of the squared shortfall. In the paper's scenarios, this reaches T = 1 from the
+greedy allocation within milliseconds, without a solver.
 """
 
 from collections.abc import Callable
@@ -12,25 +12,25 @@ import numpy as np
 from alloc.problems.instance import FloatArray, IntArray
 
 DONE = 1 - 1e-12
-"""Part of its workload at which a task counts as done; the rest is rounding."""
+"""Share of its workload from which a task counts as done, to allow for rounding errors."""
 
 EMPTY = 1e-12
-"""Part of its workload below which a task counts as served by nobody."""
+"""Share of its workload below which a task counts as unserved."""
 
 MAX_SWAPS = 100_000
-"""Swaps looked at in one step; of more, a sample is drawn."""
+"""Number of swaps evaluated in one step; of more, a random sample is drawn."""
 
 
 @dataclass(frozen=True, eq=False)
 class Descent:
-    """The state of the descent: agents per class and task, the last column being the idle ones.
+    """The state of the descent: agents per class and task, with idle ones in the last column.
 
     Attributes
     ----------
     share : ndarray, shape (k, t + 1)
-        Part of each task that one agent of each class does; 0 in the last column.
+        Share of each task that one agent of each class does; 0 in the last column.
     allowed : ndarray of bool, shape (k, t + 1)
-        Where agents of each class may go.
+        Tasks to which agents of each class may be assigned.
     counts : ndarray of int, shape (k, t + 1)
         Agents of each class on each task; changed in place.
     progress : ndarray, shape (t + 1,)
@@ -56,7 +56,7 @@ class Descent:
 
     @property
     def shortfall(self) -> float:
-        """Sum over tasks of the squared shortfall."""
+        """Objective: the sum over tasks of the squared shortfall."""
         return float(_shortfall(self.progress).sum())
 
     @property
@@ -65,7 +65,7 @@ class Descent:
         return bool(self.progress.min() >= DONE)
 
     def run(self, rng: np.random.Generator, should_stop: Callable[[], bool]) -> None:
-        """Take the best move or swap for the task done least of those that have one, until none has."""
+        """Repeat the best move or swap for the worst task that has an improving one, until none has."""
         stuck = np.zeros(len(self.progress), dtype=bool)
         while not should_stop():
             task = int(np.where(stuck, np.inf, self.progress).argmin())
@@ -79,7 +79,7 @@ class Descent:
             stuck[:] = False
 
     def restore(self, counts: IntArray, progress: FloatArray) -> None:
-        """Go back to an earlier state."""
+        """Restore an earlier state."""
         self.counts[:], self.progress[:] = counts, progress
 
     def kick(self, rng: np.random.Generator) -> None:
@@ -90,7 +90,7 @@ class Descent:
             self._move(agent_class, task, target)
 
     def _best_change(self, task: int, rng: np.random.Generator) -> tuple[int, int, int] | None:
-        """Return the class that comes to `task`, where from, and the class that goes there in exchange (-1: none)."""
+        """Return the class moved to `task`, its origin, and the class moved there in exchange (-1 for none)."""
         agent_class, origin = np.divmod(np.flatnonzero(self.counts), self.counts.shape[1])
         comes = (origin != task) & (self.share[agent_class, task] > 0)
         agent_class, origin = agent_class[comes], origin[comes]
@@ -125,7 +125,7 @@ class Descent:
 
 
 def _shortfall(progress: FloatArray) -> FloatArray:
-    """Square of the part that is not done, and a penalty where nobody is left."""
+    """Return the squared share of each task that is not done, plus a penalty for unserved tasks."""
     part: FloatArray = np.maximum(0.0, 1 - progress)
     return part * part + 1e3 * (progress <= EMPTY)
 
@@ -139,25 +139,25 @@ def descend(
     kicks: int = 0,
     should_stop: Callable[[], bool] = lambda: False,
 ) -> tuple[IntArray, bool]:
-    """Look for a plan that does every task.
+    """Search for a plan that does every task.
 
     Parameters
     ----------
     share : ndarray, shape (k, t)
-        Part of each task that one agent of each class does by the time asked for, at most 1.
+        Share of each task that one agent of each class does by the given time, at most 1.
     counts : ndarray of int, shape (k, t)
-        Agents of each class on each task to begin with.
+        Initial numbers of agents of each class on each task.
     free : ndarray of int, shape (k,)
         Idle agents of each class.
     rng : numpy.random.Generator
     kicks : int
-        Descents from the best state after a perturbation.
+        Number of perturbations of the best state, each followed by a descent.
     should_stop : callable
 
     Returns
     -------
     ndarray of int, shape (k, t)
-        The best counts met.
+        The best counts found.
     bool
         Whether they do every task.
     """

@@ -1,8 +1,8 @@
-"""All groups that a task could have in any plan with makespan T.
+"""Enumeration of all groups that tasks can have in plans with makespan T.
 
-At the dual prices of the configuration linear programme all agents cost a known sum, and the cheapest groups of all
-tasks cost nearly as much. So a group that costs more than the cheapest one of its task and what is left over is in no
-plan (reduced cost fixing). Where few are left, they are the columns of a set partitioning problem.
+At the dual prices of the configuration linear programme, the cheapest groups of all tasks cost nearly as much as all
+agents. A group that exceeds the cost of its task's cheapest group by more than the difference is in no plan (reduced
+cost fixing). If few groups remain, they are the columns of a set partitioning problem.
 
 References
 ----------
@@ -22,21 +22,21 @@ from alloc.allocators.runtime.compiled import compiled
 from alloc.problems.instance import FloatArray
 
 MAX_GROUPS = 60_000
-"""Groups in all above which the set partitioning problem takes too long."""
+"""Total number of groups above which the set partitioning problem takes too long."""
 
 MAX_NODES = 3_000_000
-"""Nodes of one enumeration; they take some hundredths of a second."""
+"""Limit on the nodes of one enumeration, which take some hundredths of a second."""
 
 MAX_CELLS = 20_000_000
-"""Classes times steps of the need above which groups are not enumerated."""
+"""Number of classes times steps of the need above which groups are not enumerated."""
 
 MAX_GROUP_SIZE = 64
-"""Agents in a group at the most."""
+"""Largest number of agents in a group."""
 
 
 @compiled
 def fill_least(weight: WholeArray, price: FloatArray, count: WholeArray, least: FloatArray) -> None:
-    """Write the least cost of meeting every need by the classes from each one on; `least` is (k + 1, most + 1)."""
+    """Write the least cost of meeting each need with classes i, i + 1, ...; `least` has shape (k + 1, most + 1)."""
     k, most = len(weight), least.shape[1] - 1
     for i in range(k, -1, -1):
         least[i, 0] = 0.0
@@ -58,24 +58,24 @@ def list_groups(
     max_nodes: int,
     groups: WholeArray,
 ) -> int:
-    """List the groups that meet a need, none of whose agents can be spared, at a cost of at most `limit`.
+    """List the minimal groups that meet a need at a cost of at most `limit`.
 
     Parameters
     ----------
     weight : ndarray of int64, shape (k,)
-        What one agent of each class adds, falling, all > 0.
+        Contribution of one agent of each class, in descending order, all > 0.
     price : ndarray of float64, shape (k,)
         Whole numbers >= 0.
     count : ndarray of int64, shape (k,)
     least : ndarray, shape (k + 1, need + 1)
-        As `fill_least` writes it; need >= 1.
+        As written by `fill_least`; need >= 1.
     groups : ndarray of int64, shape (most, MAX_GROUP_SIZE)
-        Gets the classes of the agents in each; -1 where there are no more.
+        Output: the classes of the agents in each group, padded with -1.
 
     Returns
     -------
     int
-        How many there are; -1 if they are too many, or the search tree has more than `max_nodes` nodes.
+        Number of groups; -1 if there are too many, or the search tree has more than `max_nodes` nodes.
     """
     k, found, depth = len(weight), 0, 0
     member = np.zeros(MAX_GROUP_SIZE + 1, dtype=np.int64)  # class tried at each depth
@@ -111,7 +111,7 @@ def list_groups(
 
 @compiled
 def write_group(row: WholeArray, member: WholeArray, size: int) -> None:
-    """Write the first `size` members, and -1 after them."""
+    """Write the first `size` members, padded with -1."""
     for place in range(len(row)):
         row[place] = member[place] if place < size else -1
 
@@ -119,7 +119,7 @@ def write_group(row: WholeArray, member: WholeArray, size: int) -> None:
 def enumerate_groups(
     configurations: ConfigurationProgramme, prices: DualPrices, time: float, should_stop: Callable[[], bool]
 ) -> SetPartitioning | None:
-    """Return the choice among all groups that can be part of a plan at T = `time`; None if they are too many."""
+    """Return the set partitioning problem over all groups of plans at T = `time`; None if there are too many."""
     needs, count, price = configurations.needs(time), configurations.count, prices.price
     costs = [configurations.group_costs(each, price) for each in needs]
     cheapest = sum(float(cost[each.need].sum()) for cost, each in zip(costs, needs, strict=True))
@@ -151,7 +151,7 @@ def enumerate_groups(
 
 
 def _least_costs(needs: TaskNeeds, price: FloatArray, count: WholeArray) -> tuple[WholeArray, FloatArray] | None:
-    """Return the classes by falling weight, and the table of `fill_least` for them; None if it is too large."""
+    """Return the classes by descending weight, and the table of `fill_least` for them; None if it is too large."""
     usable = np.flatnonzero((needs.weight > 0) & (count > 0))
     order = usable[np.argsort(-needs.weight[usable], kind="stable")]
     if len(order) * int(needs.need.max()) > MAX_CELLS:
@@ -162,7 +162,7 @@ def _least_costs(needs: TaskNeeds, price: FloatArray, count: WholeArray) -> tupl
 
 
 def _count_members(members: WholeArray, order: WholeArray, classes: int) -> WholeArray:
-    """Return the agents of each class in each group, shape (p, classes), given the places of members in `order`."""
+    """Return the agents of each class in each group, shape (p, classes), given members as indices into `order`."""
     groups = np.zeros((len(members), classes), dtype=np.int64)
     line, place = np.nonzero(members >= 0)
     np.add.at(groups, (line, order[members[line, place]]), 1)
@@ -170,7 +170,7 @@ def _count_members(members: WholeArray, order: WholeArray, classes: int) -> Whol
 
 
 def compile_loops() -> None:
-    """Compile the loops of this module, or read it from the cache, so that no run waits for it."""
+    """Compile the loops of this module, or load them from the cache, so that they do not delay a run."""
     ones = np.ones(2, dtype=np.int64)
     read_group(fill_table(ones, np.ones(2), ones, 2, False), 2, 1)
     least = np.empty((3, 3))[:, :2]

@@ -1,4 +1,4 @@
-"""Lower bounds without the solver: by configurations, by groups, and by fractions of agents."""
+"""Lower bounds without the solver: by configurations, by enumeration of groups, and by fractional agents."""
 
 from alloc.allocators.exact.makespan.ascent import ConfigurationAscent
 from alloc.allocators.exact.makespan.configuration import ConfigurationProgramme
@@ -9,14 +9,14 @@ from alloc.allocators.exact.makespan.state import MakespanState
 from alloc.allocators.exact.solver_model import Verdict
 
 FIRST_ASCENT, ASCENT = 0.05, 0.5
-"""Share of the time of the first ascent, enough as a rule for prices that guide the search for plans, and the part of
-the time for bounds that later ones take, as they soon gain little."""
+"""Time share of the first ascent, usually enough for prices that guide the search for plans, and the share of the time
+for bounds that later ascents take, as they soon gain little."""
 
 LEAST_ASCENT_S = 0.05
-"""Least seconds of an ascent."""
+"""Minimum duration of an ascent in seconds."""
 
 REPEATABLE_ROUNDS = 60
-"""Rounds of one ascent where effort is counted."""
+"""Rounds of one ascent in repeatable runs."""
 
 
 def raise_bound_by_configurations(state: MakespanState, share: float) -> None:
@@ -39,9 +39,9 @@ def raise_bound_by_configurations(state: MakespanState, share: float) -> None:
 
 
 def raise_bound_by_relaxation(state: MakespanState) -> None:
-    """Raise the lower bound by what fractions of agents could do, where not all agents can be everywhere at once.
+    """Raise the lower bound by the relaxation with fractional agents, if reach or travel times are limited.
 
-    Where travel takes time, prices for whole agents do so sooner than linear programmes.
+    If travel takes time, prices for integer agents raise the bound sooner than linear programmes.
     """
     instance = state.search.instance
     if state.ended or state.partial or not (instance.has_travel_time or not instance.reach.is_complete):
@@ -59,7 +59,7 @@ def raise_bound_by_relaxation(state: MakespanState) -> None:
 
 
 def probe_by_groups(state: MakespanState, time: float, seconds: float) -> Verdict:
-    """Look for groups that make up a plan with makespan `time`, or prove that there are none."""
+    """Search for groups that form a plan with makespan `time`, or prove that there are none."""
     configurations = state.configurations
     if configurations is None:
         return Verdict.UNKNOWN
@@ -86,7 +86,7 @@ def probe_by_groups(state: MakespanState, time: float, seconds: float) -> Verdic
 
 
 def _ascend(state: MakespanState, until_s: float) -> None:
-    """Raise the lower bound by a subgradient method, where each task has a knapsack of its own."""
+    """Raise the lower bound by the subgradient method, with a separate knapsack for each task."""
     if state.ascent is None or not state.ascent.is_tractable:
         return
     rounds = 0
@@ -100,7 +100,7 @@ def _ascend(state: MakespanState, until_s: float) -> None:
 
 
 def _bisect_by_prices(state: MakespanState, configurations: ConfigurationProgramme, until_s: float) -> bool:
-    """Bisect on T between the bound and the least T that dual prices do not exclude; return whether that ended."""
+    """Bisect on T between the bound and the least T not excluded by dual prices; return whether that finished."""
     time, possible = state.lower, state.upper
     while not state.ended and possible > state.lower * (1 + configurations.precision):
         prices = configurations.dual_prices(time, lambda: state.over or state.search.elapsed_s > until_s)

@@ -1,4 +1,4 @@
-"""A probe: whether there is a plan with makespan T."""
+"""Probes: deciding whether there is a plan with makespan T."""
 
 from dataclasses import dataclass
 from enum import Enum
@@ -11,25 +11,25 @@ from alloc.allocators.exact.monitor import SolverMonitor
 from alloc.allocators.exact.solver_model import Solver, SolverLimits, SolverModel, Verdict
 
 SOLVER_PART = 0.5
-"""Part of the time of a probe that the solver gets, after groups have had all of it."""
+"""Share of a probe's time that the solver gets after the group enumeration has used all of it."""
 
 
 class Purpose(Enum):
-    """What a probe is for."""
+    """Purpose of a probe."""
 
     BISECT = "bisect"
-    """To halve the gap; without a verdict, T becomes the lower end of the bisection."""
+    """Halve the gap; without a verdict, T becomes the lower end of the bisection."""
 
     BELOW_PLAN = "below the plan"
-    """To see early, by a T just below the fastest plan, whether that is the optimum; no matter if it stays open."""
+    """Check early, by a T just below the fastest plan, whether that is optimal; a missing verdict has no effect."""
 
     LAST = "last"
-    """To use the time left once all other probes have stayed open."""
+    """Use the remaining time once all other probes have ended without a verdict."""
 
 
 @dataclass(frozen=True)
 class Probe:
-    """A makespan T in hours, the seconds that its probe may take, and what it is for."""
+    """A makespan T in hours, the time limit of its probe in seconds, and the purpose."""
 
     time: float
     seconds: float
@@ -37,7 +37,7 @@ class Probe:
 
 
 def probe_makespan(state: MakespanState, solver: Solver, probe: Probe) -> Verdict:
-    """Look for a plan with makespan T or a proof that there is none, by ever more expensive means."""
+    """Search for a plan with makespan T or a proof that there is none, by increasingly expensive means."""
     demand = state.model.at(probe.time)
     if demand.trivially_infeasible:
         state.rule_out(probe.time)
@@ -52,7 +52,7 @@ def probe_makespan(state: MakespanState, solver: Solver, probe: Probe) -> Verdic
 
 
 def _building_s(state: MakespanState, solver: Solver) -> float:
-    """Seconds that the solver's model takes to be built: a probe that is shorter does without it."""
+    """Return the seconds for building the solver's model; shorter probes do without the solver."""
     return 2 * len(state.model.class_of_pair) / solver.pairs_per_second
 
 
@@ -67,7 +67,7 @@ def _probe_by_solver(state: MakespanState, solver: Solver, demand: Demand, probe
     )
 
     def meanwhile() -> bool:
-        """Whether the local search beside the solver has found a plan for this T."""
+        """Return whether the parallel local search has found a plan for this T."""
         if state.local_search is not None:
             state.local_search.exchange()
         return state.upper <= probe.time or state.closed

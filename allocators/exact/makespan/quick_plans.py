@@ -1,4 +1,4 @@
-"""Plans without the solver: descents, and the repartition search."""
+"""Plans without the solver, by descents and repartition search."""
 
 import numpy as np
 
@@ -6,22 +6,22 @@ from alloc.allocators.exact.makespan.descent import descend
 from alloc.allocators.exact.makespan.state import TIGHT, MakespanState
 
 MANY_KICKS, FEW_KICKS = 300, 20
-"""Kicks of a descent: where solvers have failed, and at the start."""
+"""Number of kicks of a descent: after solvers have failed, and at the start."""
 
 REPEATABLE_TARGETS = 20
-"""Target makespans of a repartition search where effort is counted."""
+"""Number of target makespans of a repartition search in repeatable runs."""
 
 PATIENCE_S = 0.05
 """Seconds without a better plan after which the repartition search may end."""
 
 FAR = 0.01
-"""Relative gap above which the first target is halfway to the lower bound, and not the bound itself."""
+"""Relative gap above which the first target is halfway to the lower bound instead of the bound itself."""
 
 STEPS_PER_TARGET = 1000
-"""Repartitions for one target makespan."""
+"""Number of repartitions for one target makespan."""
 
 STEPS_PER_PROBE = 20_000
-"""Repartitions for a makespan that is probed."""
+"""Number of repartitions for a probed makespan."""
 
 
 def descend_in_steps(state: MakespanState) -> None:
@@ -34,12 +34,12 @@ def descend_in_steps(state: MakespanState) -> None:
 
 
 def search_repartitions(state: MakespanState, share: float) -> None:
-    """Search repartitions for target makespans closer to the fastest plan, for this share of the time at the most.
+    """Search by repartition for target makespans closer to the fastest plan, for at most this share of the time.
 
     Parameters
     ----------
     share : float
-        The search ends earlier where plans do not get better.
+        Time share; the search ends earlier if plans no longer improve.
     """
     search, repartition = state.search, state.repartition
     if not repartition.is_tractable or state.partial or state.ended:  # it cannot choose which tasks to serve
@@ -68,7 +68,7 @@ def search_repartitions(state: MakespanState, share: float) -> None:
 
 
 def find_plan(state: MakespanState, time: float) -> bool:
-    """Search repartitions, or descend where there are too many agents; return whether a plan for `time` was found."""
+    """Search by repartition, or by descent if there are too many agents; return whether a plan for `time` was found."""
     if not state.repartition.is_tractable:
         return _descend(state, time, 0.05, kicks=MANY_KICKS)
     state.repartition.start(state.plan)

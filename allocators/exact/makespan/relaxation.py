@@ -1,10 +1,9 @@
-"""A lower bound on the makespan from linear programmes alone: what fractions of agents could do.
+"""A lower bound on the makespan by linear programmes with fractional agents.
 
-At a fixed T the programme maximises the least part of its need that a task gets. Its dual prices of the tasks prove
-more than that one T: with any prices >= 0, T is impossible if the value of all agents together, each on the task where
-it has the most, is less than that of all needs. So from one solution to the next T is raised to the largest one that
-the last prices exclude, which takes a few solutions in all (Newton's method; Dinkelbach (1967),
-doi:10.1287/mnsc.13.7.492).
+At a fixed T, the programme maximises the smallest share of its need that a task gets. Its dual prices of the tasks
+exclude more than this T: with any prices >= 0, T is infeasible if the total value of all agents, each on its most
+valuable task, is less than that of all needs. So after each solution, T is raised to the largest value that the last
+prices exclude, which converges in a few solutions (Newton's method; Dinkelbach (1967), doi:10.1287/mnsc.13.7.492).
 """
 
 import time
@@ -20,13 +19,13 @@ from alloc.allocators.runtime.linear_programme import minimise
 from alloc.problems.instance import FloatArray
 
 MAX_PAIRS = 400_000
-"""Pairs of class and task above which a linear programme takes too long."""
+"""Number of pairs of class and task above which a linear programme takes too long."""
 
 SAFETY = 1e-10
-"""Part of the workload by which fractions of agents must fall short before that counts as a proof."""
+"""Share of the workload by which fractional agents must fall short before that counts as a proof."""
 
 CLOSE = 1e-5
-"""Relative rise of the bound at which the method ends."""
+"""Relative increase of the bound below which the method ends."""
 
 PRECISION = 1e-9
 """Relative precision of the largest T that given prices exclude."""
@@ -35,20 +34,20 @@ PRECISION = 1e-9
 def relaxed_lower_bound(
     model: Model, low: float, high: float, seconds: float, should_stop: Callable[[], bool]
 ) -> tuple[float, FloatArray | None]:
-    """Return a T from `low` to `high` such that no plan is faster, even with fractions of agents; nearly the largest.
+    """Return (nearly) the largest T from `low` to `high` such that no plan, even with fractional agents, is faster.
 
-    Returns also the value of a unit of each workload near there, shape (t,), if that was found.
+    Also return the value of a unit of each workload near that T, shape (t,), or None.
 
     Parameters
     ----------
     model : Model
         All of its tasks must be served.
     low, high : float
-        Hours; a proven bound, and the makespan of a plan.
+        Hours; a proven lower bound, and the makespan of a plan.
     seconds : float
         Time limit.
     should_stop : callable
-        Asked every 20 ms.
+        Called every 20 ms.
     """
     end, last = time.monotonic() + seconds, None
     while len(model.class_of_pair) <= MAX_PAIRS and low < high and not should_stop():
@@ -70,7 +69,7 @@ def relaxed_lower_bound(
 
 
 def _dual_prices(demand: Demand, seconds: float, should_stop: Callable[[], bool]) -> FloatArray | None:
-    """Return the prices of one unit of each need, shape (t,), or None where time is up."""
+    """Return the price of a unit of each need, shape (t,), or None if time is up."""
     if seconds <= 0:
         return None
     pairs, tasks, classes = len(demand.class_of_pair), len(demand.need), len(demand.count)
@@ -88,7 +87,7 @@ def _dual_prices(demand: Demand, seconds: float, should_stop: Callable[[], bool]
 
 
 def _largest(model: Model, low: float, high: float, is_excluded: Callable[[Demand], bool]) -> float:
-    """Return the largest T from `low`, which is excluded, to `high` that is, or close to it."""
+    """Return (nearly) the largest excluded T from `low`, which is excluded, to `high`."""
     if is_excluded(model.at(high)):
         return high
     while high - low > PRECISION * high:
@@ -98,7 +97,7 @@ def _largest(model: Model, low: float, high: float, is_excluded: Callable[[Deman
 
 
 def _excludes(price: FloatArray, demand: Demand) -> bool:
-    """Whether the value of all agents is less than that of all needs: weak duality, so that any prices prove it."""
+    """Whether the value of all agents is less than that of all needs: a proof for any prices, by weak duality."""
     needed = float(price @ demand.need)
     return _largest_value(demand, price[demand.task_of_pair] * demand.weight) < needed * (1 - SAFETY)
 

@@ -10,21 +10,21 @@ from alloc.allocators.exact.knapsack import Table, WholeArray, read_group
 from alloc.problems.instance import FloatArray, IntArray
 
 CLOSE = 1e-9
-"""Gap at which the programme counts as solved, and by which theta may exceed 1 although no prices prove that."""
+"""Gap at which the programme counts as solved, and by which theta may exceed 1 without a proof by prices."""
 
 GROUPS_AT_ONCE = 100
-"""Groups added to the programme at once, about, where there are few rows."""
+"""Approximate number of groups added at once if there are few rows."""
 
 
 @dataclass(frozen=True, eq=False)
 class TaskNeeds:
-    """What tasks that can use the same agents alike need at some T, in whole steps.
+    """Needs at some T, in integer steps, of tasks with equal weights of agents.
 
     Attributes
     ----------
     tasks : ndarray of int, shape (g,)
     weight : ndarray of int64, shape (k,)
-        What one agent of each class adds.
+        Contribution of one agent of each class.
     need : ndarray of int64, shape (g,)
     """
 
@@ -34,26 +34,26 @@ class TaskNeeds:
 
 
 class RestrictedMaster:
-    """Minimise theta over the groups known; tasks of the same need and weights are one row.
+    """Minimise theta over the known groups; tasks with equal needs and weights share a row.
 
     Parameters
     ----------
     tasks : list of TaskNeeds
     count : ndarray of int64, shape (k,)
-        Agents in each class.
+        Number of agents in each class.
 
     Attributes
     ----------
     solved : bool
         Whether there is a solution yet.
     theta : float
-        Its value.
+        The optimal value.
     price : ndarray, shape (k,)
-        Dual prices of the classes, all agents costing 1 together.
+        Dual prices of the classes, with total cost 1 of all agents.
     """
 
     def __init__(self, tasks: list[TaskNeeds], count: WholeArray) -> None:
-        self._rows: list[tuple[int, int, int]] = []  # index into `tasks`, need, how many tasks
+        self._rows: list[tuple[int, int, int]] = []  # index into `tasks`, need, number of tasks
         for index, needs in enumerate(tasks):
             values, times = np.unique(needs.need, return_counts=True)
             self._rows += [(index, int(v), int(c)) for v, c in zip(values, times, strict=True)]
@@ -79,14 +79,14 @@ class RestrictedMaster:
             self._add(max(met)[1], group)
 
     def add_groups(self, tables: list[Table], price: FloatArray, known: list[WholeArray]) -> bool:
-        """Add cheap groups of negative reduced cost, to `known` as well; return whether there were any.
+        """Add groups of negative reduced cost, also to `known`; return whether there were any.
 
-        Of each row the cheapest one, and where there are few rows, the cheapest ones with an agent of each class.
+        For each row the cheapest group and, if there are few rows, the cheapest ones with an agent of each class.
 
         Parameters
         ----------
         price : ndarray, shape (k,)
-            Of the tables.
+            Prices at which the tables were computed.
         """
         new, most = False, max(1, GROUPS_AT_ONCE // len(self._rows))
         for row, (index, need, _) in enumerate(self._rows):
@@ -101,7 +101,7 @@ class RestrictedMaster:
     def _cheap_groups(
         self, needs: TaskNeeds, table: Table, price: FloatArray, need: int, most: int
     ) -> Iterator[WholeArray]:
-        """Yield the cheapest group, and then the cheapest with an agent of a class, for the classes that add least."""
+        """Yield the cheapest group, then the cheapest ones with an agent of a class, for the classes that add least."""
         classes = len(self._count)
         yield read_group(table, classes, need)
         if most == 1:

@@ -1,4 +1,4 @@
-"""Set partitioning: choose one group for each task such that no class of agents is used more often than it can be."""
+"""Set partitioning: choose one group for each task such that no class of agents is exceeded."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ from alloc.problems.instance import IntArray
 
 @dataclass(frozen=True, eq=False)
 class SetPartitioning:
-    """The integer programme: z_p tasks take group p.
+    """The integer programme, in which z_p tasks take group p.
 
         sum_p z_p = tasks alike of row r, over the groups p for that row;   sum_p agents_pk z_p <= count_k.
 
@@ -24,9 +24,9 @@ class SetPartitioning:
     groups : ndarray of int64, shape (p, k)
         Agents of each class in each group.
     row : ndarray of int, shape (p,)
-        Row of tasks alike that each group is for.
+        Row of identical tasks that each group is for.
     tasks : list of ndarray of int
-        Tasks alike, per row.
+        The identical tasks of each row.
     count : ndarray of int64, shape (k,)
     """
 
@@ -45,7 +45,7 @@ def solve_set_partitioning(
     -------
     Verdict
     ndarray of int64, shape (k, t), or None
-        Agents of each class on each task of the model, where that is feasible.
+        Agents of each class on each task of the model, if feasible.
     """
     highs = highspy.Highs()
     highs.HandleUserInterrupt = True
@@ -88,7 +88,7 @@ def _formulate(programme: SetPartitioning) -> highspy.HighsLp:
 
 
 def _table(programme: SetPartitioning, times: WholeArray) -> WholeArray:
-    """Give each task one of the groups chosen for those alike, which were chosen so many `times`."""
+    """Distribute the chosen groups, each chosen a number of `times`, to the identical tasks of their rows."""
     table = np.zeros((len(programme.count), sum(len(tasks) for tasks in programme.tasks)), dtype=np.int64)
     free = [list(tasks) for tasks in programme.tasks]
     for group in np.repeat(np.arange(len(times)), times).tolist():

@@ -1,4 +1,4 @@
-"""The state that the phases of the makespan stage pass along."""
+"""The shared state of the phases of the makespan stage."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -19,59 +19,59 @@ from alloc.problems import Allocation, Evaluation, Objective, agent_classes
 from alloc.problems.instance import FloatArray
 
 TIGHT = 1e-8
-"""Relative gap at which the stage ends; well above the tolerance of 1e-9 that solvers and scores have."""
+"""Relative gap at which the stage ends, well above the tolerance of solvers and scores, 1e-9."""
 
 UNLIMITED_S = 60.0
-"""Seconds of which phases get their shares where there is no time limit."""
+"""Seconds to which the shares of phases refer without a time limit."""
 
 LEAST_WEIGHT = 1 / 8
-"""Part of its usual time that a phase which finds nothing still gets."""
+"""Smallest weight of a phase that finds nothing, relative to its usual time."""
 
 LEAST_SHARE = 0.2
-"""Part of the stage that the time until the fastest plan was found counts as at least, where patience is limited."""
+"""Lower limit, as a share of the stage, on the time until the fastest plan in the criterion of patience."""
 
 TELLING_SHARE = 0.05
-"""Share of the time from which on it tells something that local search finds nothing."""
+"""Share of the time from which a turn of local search without success is significant."""
 
 
 @dataclass(eq=False)
 class MakespanState:
-    """Bounds on the least makespan, and what the phases need to improve them; plans go to `search`.
+    """Bounds on the least makespan, and the data that phases need to improve them; plans go to `search`.
 
     Attributes
     ----------
     search : Search
     model : Model
-        Classes not told apart by place.
+        Classes that do not distinguish places.
     begin_s, until_s : float
         Seconds since the run began at which the stage began and must end; the latter ``inf`` without a time limit.
     patience : float
         Time without a faster plan, as a multiple of the time until the fastest was found, after which the stage ends.
     descent : bool
-        Whether plans are looked for without the solver.
+        Whether to search for plans without the solver.
     repeatable : bool
-        Whether effort is counted and not timed.
+        Whether effort is counted rather than timed.
     rng : numpy.random.Generator
     repartition : RepartitionSearch
     lower : float
-        Proven: no plan that serves `model.min_served` tasks has a smaller makespan, in hours.
+        Proven lower bound, in hours, on the makespan of plans that serve `model.min_served` tasks.
     unresolved : float
-        Least makespan above the largest T whose probe ended without a verdict; no bound, but the lower end of the
+        Least makespan above the largest T whose probe ended without a verdict; not a bound, but the lower end of the
         bisection.
     bounds_tried : bool
-        Whether linear programmes have been used for a bound; after that, a probe tries more before the solver.
+        Whether linear programmes have been used for a bound; after that, probes try more before the solver.
     bounds_converged : bool
-        Whether the configuration linear programme has nothing more to prove.
+        Whether the configuration linear programme cannot raise the bound further.
     configurations : ConfigurationProgramme or None
-        None before that, and where the programme is too large.
+        None before that, and if the programme is too large.
     price : ndarray, shape (t,), or None
-        Value of a unit of each workload by the linear programme of single agents, where that was solved.
+        Value of a unit of each workload by the linear programme of single agents, if that was solved.
     ascent : ConfigurationAscent or None
         None before it is needed.
     local_search : LocalSearchPhase or None
-        None where the solver is quick enough by itself, or must find plans alone, or some tasks stay unserved.
+        None if the solver is fast enough by itself or is to find plans alone, or if some tasks stay unserved.
     local_weight : float
-        Part of its usual time that local search gets: less after each turn that found nothing.
+        Weight of local search relative to its usual time, reduced after each turn that found nothing.
     """
 
     search: Search
@@ -126,20 +126,20 @@ class MakespanState:
 
     @property
     def closed(self) -> bool:
-        """Whether the fastest plan is proven, or keeps to the limit that was given."""
+        """Whether the fastest plan is proven optimal, or within the given makespan limit."""
         given = self.search.tolerance.limit
         return self.upper <= max(self.lower * (1 + TIGHT), given or 0.0)
 
     @property
     def over(self) -> bool:
-        """Whether time or patience is at its end, or the run must end."""
+        """Whether time or patience has run out, or the run must end."""
         return is_over(self.search) or self.search.elapsed_s >= self.until_s or self.has_stalled
 
     @property
     def has_stalled(self) -> bool:
-        """Whether no faster plan has been found for so long that patience is at its end.
+        """Whether patience has run out without a faster plan.
 
-        Not where abilities are multiples of a unit: there a proof may come at any time.
+        Never if abilities are multiples of a unit, as a proof may then come at any time.
         """
         if np.isinf(self.patience) or np.isinf(self.until_s) or self.model.unit is not None:
             return False
@@ -150,7 +150,7 @@ class MakespanState:
 
     @property
     def ended(self) -> bool:
-        """Whether nothing is left to do."""
+        """Whether the stage has ended."""
         return self.closed or self.over
 
     @property
@@ -159,15 +159,15 @@ class MakespanState:
         return self.model.min_served < len(self.model.tasks)
 
     def would_prove(self, time: float) -> bool:
-        """Whether a lower bound of `time` would prove the fastest plan to 1e-6."""
+        """Whether a lower bound of `time` would prove the fastest plan optimal to 1e-6."""
         return self.upper - time <= PROVEN * self.upper
 
     def rule_out(self, time: float) -> None:
-        """Take note that no plan has a makespan of `time` or less."""
+        """Record that no plan has a makespan of `time` or less."""
         self.rule_out_below(self.model.next_makespan(time))
 
     def rule_out_below(self, time: float) -> None:
-        """Take note that no plan has a makespan less than `time`."""
+        """Record that no plan has a makespan less than `time`."""
         self.lower = max(self.lower, time)
         if not self.partial:
             self.search.raise_bound(min(self.lower, self.upper))
@@ -177,7 +177,7 @@ class MakespanState:
         return self._in_time(self.search.submit(plan), time)
 
     def verdict_on(self, plan: Allocation, time: float) -> Verdict:
-        """Submit a solver's plan for `time`; by rounding, it may be too slow, or no faster than the fastest."""
+        """Submit a solver's plan for `time`, which by rounding may be too slow; return the verdict."""
         upper, score = self.upper, self.search.submit(plan)
         faster = self._in_time(score, time) and score.served_makespan < upper
         return Verdict.FEASIBLE if faster else Verdict.UNKNOWN
@@ -188,7 +188,7 @@ class MakespanState:
 
     @contextmanager
     def with_local_search(self) -> Iterator[None]:
-        """Have local search at hand in the block."""
+        """Make local search available within the block."""
         if not self.descent or self.partial or len(self.model.class_of_pair) <= FEW_PAIRS:
             yield
             return
@@ -197,7 +197,7 @@ class MakespanState:
         self.local_search = None
 
     def search_locally(self, share: float) -> None:
-        """Improve the fastest plan by local search for this share of the time, where it is at hand."""
+        """Improve the fastest plan by local search, if available, for this share of the time."""
         if self.local_search is not None and not self.ended:
             upper = self.upper
             self.local_search.turn(self.share_s(share * self.local_weight, 0.08))
@@ -205,19 +205,19 @@ class MakespanState:
                 self.local_weight = reweighted(self.local_weight, found=self.upper < upper)
 
     def share_s(self, share: float, least_s: float = 0.1) -> float:
-        """Return this share of the stage's time in seconds, at least `least_s`; ``inf`` where effort is counted."""
+        """Return this share of the stage's time in seconds, at least `least_s`; ``inf`` in repeatable runs."""
         if self.repeatable:
             return float("inf")
         return max(least_s, share * (self.until_s if np.isfinite(self.until_s) else UNLIMITED_S))
 
 
 def reweighted(weight: float, *, found: bool) -> float:
-    """Return the part of its usual time that a phase gets next: all of it where its last turn found something."""
+    """Return the next weight of a phase: 1 if its last turn found something, otherwise less."""
     return 1.0 if found else max(LEAST_WEIGHT, weight / 2)
 
 
 def _simple_bound(search: Search, model: Model) -> float:
-    """All abilities against the smallest workloads that are to be served."""
+    """Return the bound by total ability and the smallest workloads that must be served."""
     if model.min_served == len(model.tasks):
         return search.lower_bound
     least = np.sort(model.workload)[: model.min_served].sum()

@@ -1,8 +1,8 @@
 """A lower bound on the makespan by prices of tasks, for up to millions of agents with short reach.
 
-By weak duality of the linear programme of single agents, T is impossible if with some prices >= 0 the value of all
-agents together, each on the task within its reach where it has the most, is less than that of all workloads. Prices of
-tasks with too few agents rise and others fall, all by factors; each change takes one pass over the pairs within reach.
+By weak duality of the linear programme of single agents, T is infeasible if for some prices >= 0 the total value of all
+agents, each on its most valuable task within reach, is less than that of all workloads. Multiplicative updates raise
+the prices of tasks with too few agents and lower the others; each takes one pass over the pairs within reach.
 """
 
 import time
@@ -18,22 +18,22 @@ from alloc.problems.instance import FloatArray, IntArray
 Int32Array = NDArray[np.int32]
 
 SAFETY = 1e-9
-"""Part by which the value of all agents must fall short before that counts as a proof: rounding of a million terms."""
+"""Relative shortfall of the agents' value required for a proof, to allow for rounding errors in a million terms."""
 
 FIRST_STEP, LAST_STEP = 2e-3, 1e-5
-"""Relative change of a price whose task is short of, or has in excess, all that it needs, at first and at the end."""
+"""Relative change of a price for a shortfall or excess of the whole need, at the start and at the end."""
 
 LARGEST_SHORTFALL = 3.0
-"""Shortfall or excess beyond which a price changes no faster."""
+"""Cap on the relative shortfall or excess in price updates."""
 
 PATIENCE = 8
 """Passes without progress after which steps are halved."""
 
 INERTIA = 0.5
-"""Part of the last direction that is added to the next."""
+"""Share of the last direction that is added to the next (momentum)."""
 
 LARGEST_RISE = 0.005
-"""Largest relative rise of T at once."""
+"""Largest relative increase of T in one step."""
 
 
 def bound_by_task_prices(instance: Instance, low: float, high: float, end: float, stopped: Callable[[], bool]) -> float:
@@ -42,11 +42,11 @@ def bound_by_task_prices(instance: Instance, low: float, high: float, end: float
     Parameters
     ----------
     instance : Instance
-        Its reach is short enough for a list of neighbours.
+        Its reach must be short enough for a neighbour list.
     low, high : float
-        Hours; a proven bound, and the makespan of a plan.
+        Hours; a proven lower bound, and the makespan of a plan.
     end : float
-        When to end, on the monotonic clock.
+        Time of the monotonic clock at which to end.
     stopped : callable
     """
     near = instance.reach.neighbours
@@ -90,7 +90,7 @@ def value_of_agents(
     time: float,
     done: FloatArray,
 ) -> float:
-    """Return the value of all agents' work per hour by `time`, each on the task where it has the most.
+    """Return the total value of the agents' work per hour by `time`, each on its most valuable task.
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ def value_of_agents(
     price : ndarray, shape (m,)
         Value of a unit of each workload.
     done : ndarray, shape (m,)
-        Gets what the agents do per hour on the tasks that they chose.
+        Output: the work per hour on each task by the agents that chose it.
     """
     total = 0.0
     for i in range(len(ability)):
@@ -119,7 +119,7 @@ def value_of_agents(
 
 
 def compile_loops() -> None:
-    """Call the loop on an instance with neighbours, whose arrays are read-only, so that no run waits for it."""
+    """Compile the loop for the read-only arrays of neighbour lists, so that it does not delay a run."""
     instance = Instance(ability=[1.0], workload=[1.0])
     near, zeros = instance.reach.neighbours, np.zeros(1)
     assert near is not None

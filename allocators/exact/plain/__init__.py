@@ -1,1 +1,1 @@
-"""The model with a variable for each agent and task, given to a solver without stages of our own."""
+"""The plain model, with a variable for each agent and task, solved by a solver alone."""

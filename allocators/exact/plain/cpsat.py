@@ -1,4 +1,4 @@
-"""The plain model by CP-SAT, whose numbers are integers: they are rounded such that every plan stays one."""
+"""The plain model by CP-SAT, with coefficients rounded to integers such that every plan stays feasible."""
 
 import math
 from collections.abc import Iterable
@@ -14,17 +14,17 @@ from alloc.problems.instance import IntArray
 from alloc.problems.models.programme import Programme
 
 RATIO_STEPS = 2**24
-"""Steps of the ratio BOUND / T, far finer than the 1e-6 to which optima are proven."""
+"""Number of steps of the ratio BOUND / T, far finer than the 1e-6 to which optima are proven."""
 
 ABILITY_BITS, COST_BITS = 33, 50
-"""Bits of the sums of abilities, and of energy, in the model: no product of them exceeds 2^58."""
+"""Bits of the sums of abilities and of energy in the model, so that no product exceeds 2^58."""
 
 EFFORT = 20.0
-"""Limit in the solver's deterministic seconds where runs must be repeatable."""
+"""Limit of repeatable runs in the solver's deterministic seconds."""
 
 
 class PlainCpSat:
-    """CP-SAT on one programme, with its own settings but for the limits and the seed."""
+    """CP-SAT on one programme, with default settings except for limits and seed."""
 
     def __init__(self, programme: Programme, limits: SolverLimits) -> None:
         self._programme, self._solver = programme, cp_model.CpSolver()
@@ -37,12 +37,12 @@ class PlainCpSat:
         parameters.relative_gap_limit = 0.0
 
     def solve(self, report: Report) -> PlainAnswer:
-        """Solve the programme, and report every plan on the way."""
+        """Solve the programme, and report every plan found."""
         model, scale = self._formulate()
         pairs = len(self._programme.kind)
 
         class Reporter(cp_model.CpSolverSolutionCallback):
-            """Reports every plan that the solver finds on its way."""
+            """Reports every plan that the solver finds."""
 
             def on_solution_callback(self) -> None:
                 report(_chosen(self.response_proto.solution, pairs))
@@ -50,7 +50,7 @@ class PlainCpSat:
         status = self._solver.solve(model, Reporter())
         proto = self._solver.response_proto
         bound = None
-        steps = proto.best_objective_bound  # 0 where the solver was stopped before it had any
+        steps = proto.best_objective_bound  # 0 if the solver was stopped before it had one
         if status in (cp_model.OPTIMAL, cp_model.FEASIBLE) or (status == cp_model.UNKNOWN and steps):
             bound = (steps + 1) / RATIO_STEPS if self._programme.is_free else max(0.0, steps / scale)
         found = status in (cp_model.OPTIMAL, cp_model.FEASIBLE)
@@ -61,7 +61,7 @@ class PlainCpSat:
         self._solver.stop_search()
 
     def _formulate(self) -> tuple[cp_model.CpModel, float]:
-        """Return the model, its first variables those of the pairs, and the scale of its costs."""
+        """Return the model, whose first variables are those of the pairs, and the scale of its costs."""
         programme, model = self._programme, cp_model.CpModel()
         x = [model.new_bool_var("") for _ in programme.kind]
         ability = _scale(float(programme.groups.ability.sum()), ABILITY_BITS)
@@ -83,18 +83,18 @@ class PlainCpSat:
 
 
 def _grouped(numbers: IntArray, count: int) -> list[IntArray]:
-    """Return the places of each number below `count`, in ascending order."""
+    """Return the indices at which each number below `count` occurs, in ascending order."""
     places = np.argsort(numbers, kind="stable")
     return np.split(places, np.searchsorted(numbers[places], np.arange(1, count)))
 
 
 def _chosen(solution: Iterable[int], pairs: int) -> IntArray:
-    """Return the pairs whose variables, the first ones, are 1."""
+    """Return the pairs whose variables, which come first, are 1."""
     return np.flatnonzero(np.fromiter(islice(solution, pairs), dtype=np.int64, count=pairs))
 
 
 def _scale(total: float, bits: int) -> float:
-    """Return the power of two by which `total` has so many bits."""
+    """Return the power of two that scales `total` to this number of bits."""
     return math.ldexp(1.0, bits - math.frexp(total)[1])
 
 

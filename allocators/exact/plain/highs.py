@@ -11,11 +11,11 @@ from alloc.problems.instance import FloatArray, IntArray
 from alloc.problems.models.programme import Programme
 
 TOLERANCE = 1e-9
-"""How far HiGHS may be off a row or an integer."""
+"""Feasibility and integrality tolerance of HiGHS."""
 
 
 class PlainHighs:
-    """HiGHS on one programme, with its own settings but for the limits, the seed and the precision."""
+    """HiGHS on one programme, with default settings except for limits, seed and precision."""
 
     def __init__(self, programme: Programme, limits: SolverLimits) -> None:
         self._programme, self._limits = programme, limits
@@ -23,14 +23,14 @@ class PlainHighs:
         self._highs.HandleUserInterrupt = True
 
     def solve(self, report: Report) -> PlainAnswer:
-        """Solve the programme, and report every plan on the way."""
+        """Solve the programme, and report every plan found."""
         programme, highs = self._programme, self._highs
         self._load()
         highs.cbMipImprovingSolution += lambda event: report(self._pairs(event.data_out.mip_solution))
         highs.solve()
         info = highs.getInfo()
         bound = info.mip_dual_bound if np.isfinite(info.mip_dual_bound) else None
-        if bound is not None:  # y is maximised by minimising -y; what is proven is proven up to the tolerance
+        if bound is not None:  # y is maximised by minimising -y; bounds hold up to the tolerance
             bound = TOLERANCE - bound if programme.is_free else max(0.0, bound * (1 - 10 * TOLERANCE))
         if info.primal_solution_status != highspy.SolutionStatus.kSolutionStatusFeasible:
             return PlainAnswer(bound=bound)

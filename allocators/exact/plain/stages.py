@@ -1,4 +1,4 @@
-"""The least makespan and then the least energy at it, by the solver alone, on the model of `problems.models`."""
+"""The least makespan, then the least energy at it, by the solver alone on the model of `problems.models`."""
 
 import math
 from collections import deque
@@ -18,12 +18,12 @@ from alloc.problems.instance import IntArray
 from alloc.problems.models.programme import Programme, build_programme
 
 Report = Callable[[IntArray], None]
-"""Takes the pairs of a plan, by index."""
+"""Callback that takes the pairs of a plan, by index."""
 
 
 @dataclass(frozen=True, eq=False)
 class PlainAnswer:
-    """What a solver found out on a programme.
+    """Answer of a solver to a programme.
 
     Attributes
     ----------
@@ -43,7 +43,7 @@ class PlainSolver(Protocol):
     def __init__(self, programme: Programme, limits: SolverLimits) -> None: ...
 
     def solve(self, report: Report) -> PlainAnswer:
-        """Solve the programme, and report every plan on the way."""
+        """Solve the programme, and report every plan found."""
         ...
 
     def stop(self) -> None:
@@ -54,13 +54,13 @@ class PlainSolver(Protocol):
 def refusal_of_plain(instance: Instance, max_pairs: int) -> str | None:
     """Return why the model cannot be stated, or None."""
     if instance.has_travel_time:
-        return "the plain model knows no finite speeds"
+        return "the plain model does not support finite speeds"
     pairs = instance.n * int((instance.workload > 0).sum())
     return None if pairs <= max_pairs else f"it takes {max_pairs} pairs of agent and task, this has {pairs}"
 
 
 def allocate_plain(search: Search, solver: type[PlainSolver]) -> Proposal:
-    """Return what the solver proves; every plan that it finds is submitted."""
+    """Return the bounds that the solver proves; submit every plan that it finds."""
     instance = search.instance
     if not (instance.workload > 0).any():
         return Proposal(Allocation.idle(instance), energy_lower_bound=0.0)
@@ -77,7 +77,7 @@ def allocate_plain(search: Search, solver: type[PlainSolver]) -> Proposal:
 
 
 def _solve(search: Search, programme: Programme, solver: type[PlainSolver]) -> PlainAnswer:
-    """Run the solver in a thread of its own until it or the run ends; submit its plans."""
+    """Run the solver in its own thread until it or the run ends; submit its plans."""
     reported: deque[IntArray] = deque(maxlen=1)
     seconds = search.remaining_s if search.budget.time_limit_s is not None else math.inf
     back_end = solver(programme, SolverLimits.of(search, seconds, search.threads))

@@ -1,1 +1,1 @@
-"""Plans by repartition: the agents of a few tasks assigned anew."""
+"""Search by repartition: the agents of a few tasks are reassigned optimally."""

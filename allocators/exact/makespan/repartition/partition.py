@@ -1,9 +1,8 @@
-"""Repartition: assign the agents of two, three or four tasks to these tasks anew, in the best way of all; compiled.
+"""Repartition: optimal reassignment of the agents of two to four tasks among these tasks, compiled.
 
-With two to four agents per task, single moves and swaps soon find nothing, while a few tasks have so few agents between
-them that all their partitions can be tried. One of the tasks has a shortfall, the others are drawn from those that
-agents could well change to; of several best partitions one is drawn, so that the search drifts over plans that are
-equally good.
+With two to four agents per task, single moves and swaps soon stall, while a few tasks together have so few agents that
+all partitions can be enumerated. One of the tasks has a shortfall; the others are drawn among those to which agents can
+easily change. Ties between best partitions are broken at random, so that the search drifts over plateaus.
 """
 
 import numpy as np
@@ -24,7 +23,7 @@ from alloc.problems.instance import FloatArray, IntArray
 
 @compiled
 def sum_subsets(value: FloatArray, size: int, sums: FloatArray) -> None:
-    """Write the sum of each subset of the first `size` values, numbered by its bits."""
+    """Write the sum of each subset of the first `size` values, indexed by bit mask."""
     sums[0] = 0.0
     for bit in range(size):
         for mask in range(1 << bit):
@@ -35,14 +34,14 @@ def sum_subsets(value: FloatArray, size: int, sums: FloatArray) -> None:
 def prepare_sums(
     value: FloatArray, base: FloatArray, need: FloatArray, tasks: int, size: int, sums: FloatArray
 ) -> tuple[float, FloatArray]:
-    """Fill `sums` for `best_partition`: what each subset of agents adds to each task, and at the most to any.
+    """Fill `sums` for `best_partition`: the contribution of each subset of agents to each task, and its maximum.
 
     Returns
     -------
     float
-        Difference up to which two shortfalls are equal.
+        Difference up to which two shortfalls count as equal.
     ndarray, shape (MAX_TASKS,)
-        What the tasks after each one need from the pool.
+        Total need from the pool of the tasks after each one.
     """
     slack, largest = 0.0, np.zeros(size)
     for task in range(tasks):
@@ -69,18 +68,18 @@ def best_partition(
     state: RandomState,
     chosen: IntArray,
 ) -> float:
-    """Assign agents to two to four tasks at the least total shortfall; return that, or ``inf`` if it exceeds `within`.
+    """Assign agents to two to four tasks with the least total shortfall; return it, or ``inf`` if it exceeds `within`.
 
     Parameters
     ----------
     value : ndarray, shape (MAX_TASKS, MAX_POOL)
-        What each of `size` agents adds to each of `tasks` tasks.
+        Contribution of each of `size` agents to each of `tasks` tasks.
     base, need : ndarray, shape (MAX_TASKS,)
-        What each task has already, and needs.
+        Work that each task has from agents outside the pool, and its need.
     sums : ndarray, shape (MAX_TASKS + 1, 2**MAX_POOL)
-        Space to work in.
+        Scratch.
     chosen : ndarray of int, shape (MAX_TASKS,)
-        Gets the agents of each task as bits, of several best partitions at random; unchanged if there is none.
+        Output: the agents of each task as bit masks, with random ties; unchanged if there is no such partition.
     """
     all_agents = (1 << size) - 1
     slack, later = prepare_sums(value, base, need, tasks, size, sums)
@@ -120,7 +119,7 @@ def best_partition(
 
 @compiled
 def count_agents(work: FloatArray, place: IntArray, has: FloatArray, size: IntArray, members: Members) -> None:
-    """Fill `has`, `size` and `members` from the task of each agent: work, number and agents of each task."""
+    """Fill `has`, `size` and `members`, the work, number and list of agents of each task, from `place`."""
     for i in range(len(place)):
         j = place[i]
         has[j] += work[i, j]
@@ -130,7 +129,7 @@ def count_agents(work: FloatArray, place: IntArray, has: FloatArray, size: IntAr
 
 @compiled
 def total_shortfall(has: FloatArray, need: FloatArray) -> tuple[float, float]:
-    """Return the sum of shortfalls, and the least part of its need that a task has."""
+    """Return the total shortfall, and the smallest share of its need that a task has."""
     total, least = 0.0, np.inf
     for j in range(len(need)):
         total += shortfall(has[j], need[j])
@@ -153,7 +152,7 @@ def reassign(
     size: IntArray,
     members: Members,
 ) -> None:
-    """Move the first `used` agents of the pool to the tasks they are `chosen` for, and update what depends on it."""
+    """Move the first `used` agents of the pool to the tasks given by `chosen`, and update all dependent arrays."""
     for q in range(tasks):
         size[task[q]] = 0
     for p in range(agents):
@@ -182,29 +181,29 @@ def search_repartitions(
     steps: int,
     state: RandomState,
 ) -> tuple[float, float, IntArray]:
-    """Assign the agents of a few tasks anew, `steps` times or until every task has what it needs.
+    """Repartition the agents of a few tasks, `steps` times or until all needs are met.
 
     Parameters
     ----------
     work : ndarray, shape (n, t)
-        What each agent adds to each task, 0 where it cannot go.
+        Contribution of each agent to each task, 0 out of reach.
     need : ndarray, shape (t,)
-        What each task needs, > 0.
+        Need of each task, > 0.
     partners : Partners
-        Which tasks are drawn together, and which agents are assigned anew.
+        Which tasks are drawn together, and which agents are reassigned.
     place : ndarray of int, shape (n,)
-        Task of each agent, no one idle; changed in place.
+        Task of each agent, none idle; changed in place.
     steps : int
     state : ndarray of uint64, shape (1,)
 
     Returns
     -------
     float
-        Total shortfall in the end.
+        Final total shortfall.
     float
-        The largest part of its need that the task with the smallest part has had.
+        Best value over the search of the smallest share of its need that a task has.
     ndarray of int, shape (n,)
-        The places at that time.
+        Task of each agent at that value.
     """
     n, t = work.shape
     has, size, members = np.zeros(t), np.zeros(t, dtype=np.int64), np.empty((t, n), dtype=np.int32)

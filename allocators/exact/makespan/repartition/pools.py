@@ -1,4 +1,4 @@
-"""What a repartition assigns anew: a few tasks between which agents can change, and some of their agents; compiled."""
+"""Selection of the tasks and agents of a repartition, compiled."""
 
 from typing import NamedTuple
 
@@ -10,16 +10,16 @@ from alloc.allocators.runtime.random import RandomState, draw
 from alloc.problems.instance import FloatArray, IntArray
 
 Members = NDArray[np.int32]
-"""Agents of each task, shape (t, n), as many as the task has."""
+"""Agents of each task, shape (t, n), valid up to the number of its agents."""
 
 MAX_TASKS = 4
-"""Tasks whose agents are assigned anew together, at the most."""
+"""Largest number of tasks in a repartition."""
 
 MAX_POOL = 12
-"""Agents assigned anew together, at the most; of larger pools some stay where they are."""
+"""Largest number of agents reassigned together; of larger pools, some agents stay where they are."""
 
 RANDOM_STEPS = 1_000_000_000
-"""Steps of a random number from 0 to 1."""
+"""Resolution of random numbers from 0 to 1."""
 
 
 class Partners(NamedTuple):
@@ -28,10 +28,9 @@ class Partners(NamedTuple):
     Attributes
     ----------
     up_to : ndarray, shape (t, t)
-        Probability that the partner drawn for the task of the row is one of the first columns; the last entry is 1, or
-        0 where the task has no partner.
+        Cumulative probabilities of the partners of each row's task; the last entry is 1, or 0 if it has no partner.
     use : ndarray of int8, shape (n, t)
-        0 where the agent is of no use to the task, 1 where it is of some, 2 where it is of good use.
+        Use of each agent to each task: 0 for none, 1 for some, 2 for good use.
     """
 
     up_to: FloatArray
@@ -40,13 +39,13 @@ class Partners(NamedTuple):
 
 @compiled
 def shortfall(has: float, need: float) -> float:
-    """How much a task has less than it needs; 0 within rounding errors."""
+    """Return the shortfall of a task, 0 within rounding errors."""
     return max(0.0, need - has) if has < need * (1 - 1e-12) else 0.0
 
 
 @compiled
 def draw_partner(up_to: FloatArray, state: RandomState) -> int:
-    """Draw a column by its row of `Partners.up_to`."""
+    """Draw a column from a row of `Partners.up_to`."""
     value = draw(state, RANDOM_STEPS) / RANDOM_STEPS
     low, high = 0, len(up_to) - 1
     while low < high:
@@ -60,7 +59,7 @@ def draw_partner(up_to: FloatArray, state: RandomState) -> int:
 
 @compiled
 def draw_tasks(has: FloatArray, need: FloatArray, partners: Partners, state: RandomState, task: IntArray) -> int:
-    """Draw a task with a shortfall, and partners of those drawn: write them to `task` and return how many they are."""
+    """Draw a task with a shortfall, then partners of those drawn; write them to `task` and return their number."""
     count, t = 0, len(need)
     for j in range(t):
         if shortfall(has[j], need[j]) > 0:
@@ -94,10 +93,10 @@ def draw_pool(
     pool: IntArray,
     at: IntArray,
 ) -> tuple[int, int]:
-    """Collect the agents of the tasks, those to be assigned anew first.
+    """Collect the agents of the tasks, those to be reassigned first.
 
-    Writes the agents to `pool`, and which of the tasks each is on to `at`; returns how many there are in all, and how
-    many are to be assigned anew: some of those that are of good use to another of the tasks, now and then of any use.
+    Write the agents to `pool` and the present task of each to `at`; return their number, and the number of those to be
+    reassigned: some of those of good use, or occasionally of any use, to another of the tasks.
     """
     agents, movable = 0, 0
     least = 1 if draw(state, 4) == 0 else 2

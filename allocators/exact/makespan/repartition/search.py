@@ -1,4 +1,4 @@
-"""Plans by `repartition`, from the fastest plan on, for one target makespan after the other."""
+"""Repartition search for plans with given target makespans, starting from the fastest plan."""
 
 from collections.abc import Callable
 
@@ -12,23 +12,23 @@ from alloc.problems.instance import FloatArray, IntArray
 from alloc.problems.vocabulary import IDLE
 
 MAX_PAIRS = 4_000_000
-"""Agent-task pairs above which there is no such search."""
+"""Number of agent-task pairs above which the search is not used."""
 
 USUAL_LOSS = 0.05
-"""Part of an agent's work that is lost on the way to another task, at which it changes a third as often."""
+"""Relative loss of an agent's work, by travel to another task, at which its weight falls to 1/e."""
 
 LEAST_USE, GOOD_USE = 1e-3, 0.02
-"""Weight of any agent in the choice of tasks, and of those that change easily."""
+"""Minimum weight of an agent in the choice of tasks, and weight above which it is of good use."""
 
 LEAST_PRICE = 0.2
-"""Least price of a need, as a part of the highest: a shortfall counts everywhere."""
+"""Smallest price of a need relative to the largest, so that every shortfall counts."""
 
 STEPS = 20
-"""Repartitions between two looks at the clock: less than a millisecond as a rule, a tenth of a second at worst."""
+"""Repartitions between two checks of the clock: usually less than a millisecond, at worst a tenth of a second."""
 
 
 class RepartitionSearch:
-    """Assigns the agents of a few tasks anew, again and again; every agent that can be of use has a task.
+    """Repeatedly reassigns the agents of a few tasks; every agent of use has a task.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ class RepartitionSearch:
         return len(self._model.classes.class_of_agent) * len(self._model.tasks) <= MAX_PAIRS
 
     def start(self, allocation: Allocation) -> None:
-        """Begin from this plan; tasks that it leaves unserved stay so."""
+        """Start from this plan; tasks that it leaves unserved stay so."""
         model, task = self._model, allocation.task_of_agent
         served = np.isin(model.tasks, task)
         self._tasks = np.flatnonzero(served)
@@ -63,19 +63,19 @@ class RepartitionSearch:
     def run(
         self, time: float, should_stop: Callable[[], bool], *, max_steps: int, price: FloatArray | None = None
     ) -> tuple[bool, Allocation]:
-        """Look for a plan with makespan `time`.
+        """Search for a plan with makespan `time`.
 
         Parameters
         ----------
         price : ndarray, shape (t,), optional
-            Value of a unit of each need; all the same by default.
+            Value of a unit of each need; all equal by default.
 
         Returns
         -------
         bool
             Whether it was found.
         Allocation
-            That plan, else the one in which the task with the smallest part of its need had the largest part.
+            That plan, or otherwise the one with the largest minimum share of needs met.
         """
         weight, need = self._model.uncapped(time)
         work = np.ascontiguousarray(weight[:, self._tasks][self._model.classes.class_of_agent])
@@ -100,7 +100,7 @@ class RepartitionSearch:
 
 
 def partners_of(work: FloatArray, *, has_travel_time: bool = False) -> Partners:
-    """Draw tasks together by how many agents are of use to both; where travel takes time, of nearly as much use."""
+    """Return partners drawn by the number of agents of use to both tasks, of nearly equal use if travel takes time."""
     use = (work > 0).astype(float)
     if has_travel_time:
         loss = 1 - work / np.maximum(work.max(axis=1, keepdims=True), 1e-300)
@@ -114,7 +114,7 @@ def partners_of(work: FloatArray, *, has_travel_time: bool = False) -> Partners:
 
 
 def compile_loops() -> None:
-    """Compile the loops, or read them from the cache, so that no run waits for it."""
+    """Compile the loops, or load them from the cache, so that they do not delay a run."""
     place = np.array([0, 0, 0, 1])
     work = np.ones((4, 2))
     search_repartitions(work, np.full(2, 2.0), partners_of(work), place, 1, np.ones(1, dtype=np.uint64))
