@@ -180,11 +180,22 @@ def _class(name: str) -> type[Allocator]:
 
 
 def _hint(key: str, method: Method, kind: type[Allocator]) -> str:
-    """Return which built-in methods have this option, or else the closest option and all options of this method."""
-    takers = [other.name for other in BUILT_IN.values() if key in other.options]
-    if takers:
-        return f"; {', '.join(takers)} {'do' if len(takers) > 1 else 'does'}"
+    """Return which of our methods take this option, or which one may be meant and all that there are."""
+    found = takers(key)
+    if found:
+        return f"; {', '.join(found)} {'do' if len(found) > 1 else 'does'}"
     return of_these(key, list(dict.fromkeys([*method.options, *kind.default_parameters()])))
+
+
+def takers(option: str) -> list[str]:
+    """Return the built-in methods that take an option.
+
+    Parameters
+    ----------
+    option : str
+        Name of the option, such as ``policy``.
+    """
+    return [method.name for method in BUILT_IN.values() if option in method.options]
 
 
 def _plugins() -> dict[str, EntryPoint]:

@@ -75,7 +75,7 @@ def checked_tolerance(slack: float, limit: float | None, objective: Objective) -
     if objective is Objective.MAKESPAN and tolerance != EXACT:
         name = "makespan_slack" if slack else "makespan_limit"
         goals = f"{Objective.MAKESPAN_ENERGY} or {Objective.MAKESPAN_MOVES}"
-        raise InputError(f"leaves room for less energy or fewer moves; use it with the objective {goals}", name)
+        raise InputError(f"needs the objective {goals}", name)
     return tolerance
 
 

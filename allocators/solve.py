@@ -22,7 +22,7 @@ from alloc.allocators.decomposition import Decomposition
 from alloc.allocators.heuristic.greedy.list_schedule import load_compiled
 from alloc.allocators.proof.early import EarlyProof, needs_solver
 from alloc.allocators.refusal import refuse
-from alloc.allocators.registry import load
+from alloc.allocators.registry import load, takers
 from alloc.allocators.replanning.plan import concluded, replanning
 from alloc.allocators.request import (
     Request,
@@ -227,7 +227,9 @@ def _require_none(parameters: object, settings: dict[str, object]) -> None:
     """Raise an error if there are parameters: ``auto`` may pick a method that does not have them."""
     given = [name for name, value in {**settings, "parameters": parameters}.items() if value is not None]
     if given:
-        raise InputError("needs a named method, such as gappo; auto may pick one that does not have it", given[0])
+        found = takers(given[0])
+        such = f", such as {found[0]}" if found else ""
+        raise InputError(f"needs a named method that has it{such}; auto may pick one without it", given[0])
 
 
 def _run(allocator: Allocator, request: Request, notes: list[str], spent_s: float) -> Result:

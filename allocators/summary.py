@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from alloc.allocators.result import Result
 
 STOPS = {
-    StopReason.PROVEN: "nothing better exists",
+    StopReason.PROVEN: "optimality is proven",
     StopReason.FINISHED: "the method finished",
     StopReason.TIME_LIMIT: "the time limit was reached",
     StopReason.ITERATIONS: "the iteration limit was reached",
@@ -42,7 +42,7 @@ MOST_NAMES = 8
 """Maximum number of ids in a list."""
 
 CLOSED_GAP = PROVEN + RELATIVE_TOLERANCE
-"""Relative gap up to which the makespan counts as optimal, as for the status `optimal` without slack."""
+"""Relative gap up to which no allocation is faster, as for the status `optimal` without slack."""
 
 
 def summary(result: "Result") -> str:
@@ -70,11 +70,11 @@ def _status(result: "Result") -> str:
     if result.status is Status.OPTIMAL:
         less = LESS[result.objective]
         if result.makespan_limit is not None:
-            return f"optimal, no allocation within {_time(result.instance, result.makespan_limit)} has {less}"
-        better = "is sooner" if result.objective is Objective.MAKESPAN else f"is sooner, or as soon with {less}"
-        return f"optimal, no allocation {better}"
+            return f"optimal; no allocation within {_time(result.instance, result.makespan_limit)} has {less}"
+        better = "is faster" if result.objective is Objective.MAKESPAN else f"is faster, or as fast with {less}"
+        return f"optimal; no allocation {better}"
     if result.status is Status.FEASIBLE:
-        return "every task is served; not proven to be the best"
+        return "every task is served; optimality is not proven"
     if result.status is Status.INFEASIBLE:
         return _shortage(result)
     return "no allocation found"
@@ -86,8 +86,8 @@ def _shortage(result: "Result") -> str:
     unserved = f"{len(tasks)} of {counted(instance.m, 'task')}"
     lost = sum(not len(instance.reach.agents_of(task)) for task in tasks) if len(tasks) <= MOST_LOOKED_AT else 0
     if lost == len(tasks):
-        return f"{unserved} can be served by nobody"
-    nobody = f", {lost} of them by nobody at all" if lost else ""
+        return f"{unserved} cannot be served by any agent"
+    nobody = f", {lost} of them by no agent at all" if lost else ""
     return f"{unserved} cannot be served along with the others{nobody}"
 
 
@@ -187,13 +187,13 @@ def _reasons(result: "Result") -> list[str]:
 def _last_tasks(instance: Instance, found: Bottleneck) -> str:
     ids = [instance.task_ids[j] for j in found.last]
     if len(ids) > 1:
-        return f"Last: {len(ids)} of {instance.m} tasks together, at {_time(instance, found.makespan)}: {_list(ids)}."
+        return f"Bottleneck: {len(ids)} of {instance.m} tasks together, at {_time(instance, found.makespan)}: {_list(ids)}."
     j = found.last[0]
     group = [instance.agent_ids[i] for i in found.agents]
     ability = float(instance.ability[list(found.agents)].sum())
     work = labelled(number(float(instance.workload[j])), instance.units.work)
     text = (
-        f"Last: task {ids[0]} at {_time(instance, found.makespan)}, workload {work}"
+        f"Bottleneck: task {ids[0]} at {_time(instance, found.makespan)}, workload {work}"
         f" on {'agent' if len(group) == 1 else f'{len(group)} agents:'} {_list(group)} (ability {number(ability)})"
     )
     if found.next_task is None:
@@ -203,8 +203,8 @@ def _last_tasks(instance: Instance, found: Bottleneck) -> str:
 
 def _gain(instance: Instance, found: Bottleneck) -> str:
     if len(found.last) > 1:
-        return "One more agent on one of them gains nothing, as the others are still last."
-    at_once = " that is there at once" if instance.has_travel_time else ""
+        return "One more agent on one of them gains nothing, as the others stay unchanged."
+    at_once = " that starts at the task" if instance.has_travel_time else ""
     if found.enough is None or found.next_task is None:
         assert found.typical is not None
         share = 1 - found.typical.makespan / found.makespan
@@ -215,16 +215,16 @@ def _gain(instance: Instance, found: Bottleneck) -> str:
     share = 1 - found.enough.makespan / found.makespan
     ability = rounded_up(found.enough.ability, whole=bool((instance.ability == instance.ability.round()).all()))
     return (
-        f"One more agent there{at_once} gains {percent(share)} at most: with ability {ability} or more"
-        f" {instance.task_ids[found.next_task]} is the last, at {_time(instance, found.enough.makespan)}."
+        f"One more agent there{at_once} gains at most {percent(share)}: with ability {ability} or more,"
+        f" {instance.task_ids[found.next_task]} becomes the last task, at {_time(instance, found.enough.makespan)}."
     )
 
 
 def _room(result: "Result", found: Bottleneck) -> str:
-    used = f"{percent(found.use)} of all ability is at work until then"
+    used = f"{percent(found.use)} of the total ability is in use until then"
     if result.gap is None or result.gap <= CLOSED_GAP:
-        return f"{used}; the same agents cannot be done sooner{_while_pinned(result)}."
-    return f"{used}; the same agents, allocated otherwise{_while_pinned(result)}, gain {percent(result.gap)} at most."
+        return f"{used}; the same agents cannot be faster{_while_pinned(result)}."
+    return f"{used}; reallocating the same agents{_while_pinned(result)} gains at most {percent(result.gap)}."
 
 
 def _while_pinned(result: "Result") -> str:

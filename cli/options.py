@@ -101,7 +101,7 @@ ObjectiveOption = Annotated[
     typer.Option(help="What is minimised, after the number of unserved tasks: the makespan, then the energy."),
 ]
 MethodOption = Annotated[
-    str, typer.Option(autocompletion=complete_methods, help="One of `alloc methods`, or auto, which picks one.")
+    str, typer.Option(autocompletion=complete_methods, help="A method from `alloc methods`; auto picks one.")
 ]
 TimeLimitOption = Annotated[
     float | None,
@@ -118,7 +118,7 @@ ThreadsOption = Annotated[
 ]
 PlotOption = Annotated[str | None, typer.Option(metavar="FILE", help="Draw the result as .png, .svg or .pdf.")]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON to standard output.")]
-QuietOption = Annotated[bool, typer.Option("--quiet", "-q", help="Print no summary, no notes, no progress.")]
+QuietOption = Annotated[bool, typer.Option("--quiet", "-q", help="Print no summary, notes or progress.")]
 SettingsOption = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="NAME=VALUE", help="A parameter of the method; may be repeated."),

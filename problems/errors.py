@@ -70,4 +70,4 @@ def of_these(name: str, known: Sequence[str]) -> str:
     """Return the end of a message about an unknown name: the most similar name, if any, and all known names."""
     close = closest(name, known)
     hint = "" if close is None else f" (did you mean {close!r}?)"
-    return f"{hint}; there are {', '.join(known)}" if known else ""
+    return f"{hint}; known are {', '.join(known)}" if known else ""

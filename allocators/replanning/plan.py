@@ -200,7 +200,7 @@ def replanning(
     """
     if plan is None and (price > 0 or objective is Objective.MAKESPAN_MOVES):
         name = "move_price" if price > 0 else "objective"
-        raise InputError("needs the plan that is in force; give it with start (--start)", name)
+        raise InputError("needs the plan in force; give it as start (--start)", name)
     if price > 0 and objective is not Objective.MAKESPAN_ENERGY:
         raise InputError(
             f"is weighed against energy; use it with the objective {Objective.MAKESPAN_ENERGY}", "move_price"

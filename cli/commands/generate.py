@@ -74,7 +74,7 @@ def generate_command(
         ),
     ],
     seed: SEED = 0,
-    count: Annotated[int, typer.Option(min=1, help="Number of instances, with consecutive seeds.")] = 1,
+    count: Annotated[int, typer.Option(min=1, help="Number of instances or missions, with consecutive seeds.")] = 1,
     output: Annotated[
         str,
         typer.Option(
@@ -98,11 +98,11 @@ def generate_command(
     starts: Annotated[Starts | None, _option("Where agents start.", "tasks")] = None,
     depots: Annotated[int | None, _option("Number of depots.", "1")] = None,
     communication_range: Annotated[
-        str | None, _option("Farthest task, in units of distance.", "none", "--range", metavar="SPREAD")
+        str | None, _option("Distance of the farthest task that an agent takes.", "none", "--range", metavar="SPREAD")
     ] = None,
     battery: Annotated[str | None, _option("Energy of an agent.", "20", metavar="SPREAD")] = None,
     speed: Annotated[str | None, _option("Distance per hour.", "none", metavar="SPREAD")] = None,
-    priority: Annotated[str | None, _option("Weight of a task in the game.", "1", metavar="SPREAD")] = None,
+    priority: Annotated[str | None, _option("Priority of a task.", "1", metavar="SPREAD")] = None,
     allowed_fraction: Annotated[float | None, _option("Share of the tasks that each agent may do.", "1")] = None,
     choices: Annotated[int | None, _option("Tasks that each agent may take, for covering.", "all")] = None,
     energy_per_distance: Annotated[float | None, _option("Energy per unit of distance.", "6")] = None,

@@ -64,7 +64,7 @@ def methods_command(
         typer.Argument(
             metavar="METHOD",
             autocompletion=options.complete_methods,
-            help="List the parameters of this method, which --set takes.",
+            help="List the parameters of this method, for --set.",
             show_default="all methods",
         ),
     ] = None,

@@ -33,7 +33,8 @@ def plot_command(
         str, typer.Argument(metavar="INSTANCE|LOG", help="An instance, or a log of `alloc simulate --log`.")
     ],
     output: Annotated[
-        str, typer.Option(metavar="FILE", help="Drawing to write: .png, .svg or .pdf; of a log also .html, .gif, .mp4.")
+        str,
+        typer.Option(metavar="FILE", help="Picture to write: .png, .svg, .pdf; for a log also .html, .gif, .mp4."),
     ],
     result: Annotated[
         str | None,

@@ -43,7 +43,7 @@ SlackOption = Annotated[
 ]
 LimitOption = Annotated[
     float | None,
-    typer.Option(metavar="TIME", help="With energy or moves: accept makespans up to this one.", show_default=False),
+    typer.Option(metavar="TIME", help="With energy or moves: accept makespans up to this.", show_default=False),
 ]
 StartOption = Annotated[
     str | None,
@@ -72,9 +72,7 @@ PlainOption = Annotated[
     ),
 ]
 PolicyOption = Annotated[str | None, typer.Option(metavar="FILE", help="A trained policy, for learned methods.")]
-DeviceOption = Annotated[
-    str | None, typer.Option(help="Where a learned method computes: cpu or cuda.", show_default="cpu")
-]
+DeviceOption = Annotated[str | None, typer.Option(help="Device of learned methods: cpu or cuda.", show_default="cpu")]
 OutputOption = Annotated[
     str | None,
     typer.Option(

@@ -168,7 +168,7 @@ def test_every_parameter_is_described(name: str) -> None:
 def test_unknown_parameters_are_answered_by_all_that_there_are() -> None:
     """A name that is none, and one with a slip, both get the list of what the method takes; one line each."""
     for given in ("colour", "populatoin"):
-        with pytest.raises(InputError, match=r"there are population, population_genes, .*distance_weight$") as caught:
+        with pytest.raises(InputError, match=r"known are population, population_genes, .*distance_weight$") as caught:
             solve(TWO, "ga", parameters={given: 1})
         assert caught.value.place == given
         assert "\n" not in str(caught.value)

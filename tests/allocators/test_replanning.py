@@ -111,8 +111,8 @@ def test_a_plan_for_another_state_of_affairs() -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"move_price": 2.0, "objective": "makespan-energy"}, "move_price: needs the plan that is in force"),
-        ({"objective": "makespan-moves"}, "objective: needs the plan that is in force"),
+        ({"move_price": 2.0, "objective": "makespan-energy"}, "move_price: needs the plan in force"),
+        ({"objective": "makespan-moves"}, "objective: needs the plan in force"),
         ({"move_price": 2.0, "start": {"a1": "t1"}}, "move_price: is weighed against energy"),
         ({"pins": {"a9": "t1"}}, "no agent 'a9'"),
         ({"pins": {"a1": "t9"}}, "no task 't9'"),
@@ -139,7 +139,7 @@ def test_what_is_proven_with_pins_is_said_to_hold_for_them() -> None:
     result = solve(instance, "cpsat", pins={"a1": "t2"})
     assert (result.status, result.makespan, dict(result.pins)) == ("optimal", 10.0, {"a1": "t2"})
     assert "with 1 agent pinned: optimal" in str(result)
-    assert "cannot be done sooner while some are pinned" in str(result)
+    assert "cannot be faster while some are pinned" in str(result)
     assert Result.from_dict(result.to_dict(), instance).pins == result.pins
     assert solve(instance, "cpsat").makespan == 2.0
 

@@ -170,9 +170,9 @@ def test_another_instance_is_refused() -> None:
 def test_printing_gives_the_summary() -> None:
     """The text has status, makespan and bottleneck, and is that of the command line."""
     text = str(result([0, 1, -1], 1.0))
-    assert text.startswith("three (3 agents, 2 tasks), test: every task is served; not proven to be the best\n")
+    assert text.startswith("three (3 agents, 2 tasks), test: every task is served; optimality is not proven\n")
     assert "makespan  1.33333 (at least 1, gap 25 %)" in text
-    assert "Last: task t1 at 1.33333," in text
+    assert "Bottleneck: task t1 at 1.33333," in text
 
 
 def test_the_table_has_a_row_per_agent() -> None:

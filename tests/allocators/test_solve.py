@@ -185,7 +185,7 @@ def test_options_need_a_name(instance: Instance) -> None:
 
 def test_auto_takes_no_options(instance: Instance) -> None:
     """What it picks depends on the size: an option that one method takes needs that method's name."""
-    with pytest.raises(InputError, match="needs a named method"):
+    with pytest.raises(InputError, match="needs a named method that has it"):
         solve(instance, "auto", policy="x.safetensors")
     assert solve(instance, "auto", policy=None).makespan == 1.0
 

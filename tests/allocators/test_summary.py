@@ -30,9 +30,9 @@ def test_abilities_are_rounded_up(ability, whole, text):
 def test_ties_gain_nothing():
     """Tasks that are last together are named, and one more agent on one of them gains nothing."""
     lines = bottleneck_lines(solve(Instance(ability=[2, 2], workload=[2, 2]), "greedy", handle_signals=False))
-    assert lines[0].startswith("Last: 2 of 2 tasks together, at 1: t1, t2")
+    assert lines[0].startswith("Bottleneck: 2 of 2 tasks together, at 1: t1, t2")
     assert "gains nothing" in lines[1]
-    assert "100 % of all ability is at work" in lines[2]
+    assert "100 % of the total ability is in use" in lines[2]
 
 
 def test_single_task_says_what_a_median_agent_gains():
@@ -46,7 +46,7 @@ def test_finite_speeds_say_so():
     instance = Instance(
         ability=[3, 1], workload=[6, 1], speed=[1, 1], agent_position=[[0, 0], [0, 1]], task_position=[[1, 0], [0, 1]]
     )
-    assert "One more agent there that is there at once" in "\n".join(
+    assert "One more agent there that starts at the task" in "\n".join(
         bottleneck_lines(solve(instance, "greedy", handle_signals=False))
     )
 
@@ -74,17 +74,17 @@ def test_what_slack_leaves_open_is_not_called_settled():
     )
     assert result.energy == 0
     lines = summary(result)
-    assert "optimal, no allocation within" in lines
-    assert "cannot be done sooner" not in lines
-    assert "the same agents, allocated otherwise, gain" in lines
+    assert "optimal; no allocation within" in lines
+    assert "cannot be faster" not in lines
+    assert "reallocating the same agents gains at most" in lines
 
 
 @pytest.mark.parametrize(
     ("sites", "text"),
     [
-        ([1, 50], "1 of 2 tasks can be served by nobody"),
+        ([1, 50], "1 of 2 tasks cannot be served by any agent"),
         ([1, 2, 3], "1 of 3 tasks cannot be served along with the others"),
-        ([1, 2, 3, 50], "2 of 4 tasks cannot be served along with the others, 1 of them by nobody at all"),
+        ([1, 2, 3, 50], "2 of 4 tasks cannot be served along with the others, 1 of them by no agent at all"),
     ],
 )
 def test_the_headline_says_what_nobody_can_do(sites, text):

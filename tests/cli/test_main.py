@@ -176,7 +176,7 @@ def test_bad_usage_is_one_line(alloc, small, arguments):
             ("convert", "small.json", "small.json/tables"),
             "small.json/tables: cannot be written: 'small.json' is a file, not a folder",
         ),
-        (("solve", "small.json", "--makespan-slack", "0.1"), "--makespan-slack: leaves room for less energy"),
+        (("solve", "small.json", "--makespan-slack", "0.1"), "--makespan-slack: needs the objective makespan-energy or makespan-moves"),
         (("solve", "small.json", "--method", "gredy"), "--method: there is no method 'gredy'"),
         (("solve", "small.json", "--method", "greedy", "--policy", "x"), "--policy: method 'greedy' takes no option"),
         (("pareto", "small.json", "--time-limit", "inf"), "--time-limit: must be a finite number"),

@@ -83,6 +83,9 @@ def test_plain_is_short_for_a_parameter(alloc):
     alloc("generate", "random", "--agents", "6", "--tasks", "3", "--seed", "1", "--output", "six.json")
     ran = alloc("solve", "six.json", "--method", "cpsat", "--plain", "--json", "--quiet")
     assert (ran.code, ran.json["parameters"], ran.json["status"]) == (0, {"plain": True}, "optimal")
+    ran = alloc("solve", "six.json", "--plain")
+    told = "alloc: --plain: needs a named method that has it, such as milp; auto may pick one without it\n"
+    assert (ran.code, ran.err) == (2, told)
     ran = alloc("solve", "six.json", "--method", "ga", "--plain")
     assert (ran.code, ran.err) == (2, "alloc: --plain: method 'ga' takes no option 'plain'; milp, cpsat do\n")
 

@@ -39,7 +39,7 @@ def pareto_command(
             autocompletion=options.complete_methods, help="A method that supports slack (see `alloc methods`), or auto."
         ),
     ] = "auto",
-    points: Annotated[int, typer.Option(min=1, max=10_000, help="Runs, one for each point of the front.")] = 10,
+    points: Annotated[int, typer.Option(min=1, max=10_000, help="Number of runs, one per point of the front.")] = 10,
     time_limit: options.TimeLimitOption = None,
     iterations: options.IterationsOption = None,
     seed: options.SeedOption = 0,

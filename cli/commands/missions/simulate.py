@@ -41,7 +41,7 @@ def simulate_command(
         str,
         typer.Option(
             autocompletion=options.complete_policies,
-            help=f"Who gives the orders: {', '.join(options.BUILT_IN_POLICIES)}, or a plugin.",
+            help=f"The policy: {', '.join(options.BUILT_IN_POLICIES)}, or a plugin.",
         ),
     ],
     knowledge: Annotated[

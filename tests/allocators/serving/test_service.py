@@ -64,7 +64,7 @@ def test_answer_has_the_result_of_solve(service):
         ({"instance": {**EASY, "agents": [{}] * 101}}, "input", "101 agents; this service accepts at most 100"),
         ({"instance": EASY, "limit_ms": 70_000}, "input", "limit_ms: must be a finite number >= 0 and at most 60000"),
         ({"instance": EASY, "method": "gaa"}, "input", "did you mean 'ga'"),
-        ({"instance": EASY, "method": "ga", "parameters": {"pop": 1}}, "input", "there are population,"),
+        ({"instance": EASY, "method": "ga", "parameters": {"pop": 1}}, "input", "known are population,"),
         ({"instance": EASY, "parameters": {"pop": 1}}, "input", "can only be set for a named method"),
         ({"instance": EASY, "method": "gappo", "parameters": {"policy": "/etc/passwd"}}, "input", "cannot be set"),
         ({"instance": EASY, "method": "gappo", "parameters": {"device": "cuda"}}, "input", "cannot be set"),

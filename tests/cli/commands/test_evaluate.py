@@ -43,7 +43,7 @@ def test_violations_give_exit_code_1(alloc, unservable):
     assert alloc("evaluate", "unservable.json", "answer.json", "--json").json["tasks"][1]["agents"] == 0
 
 
-@pytest.mark.parametrize("words", ["task", "t2", "workload", "done at", "Last: task"])
+@pytest.mark.parametrize("words", ["task", "t2", "workload", "done at", "Bottleneck: task"])
 def test_table_names_tasks(alloc, small, words):
     """People get a table with a row per task, and what holds the makespan up."""
     write({"a1": "t1", "a4": "t2", "a5": "t3"})

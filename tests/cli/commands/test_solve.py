@@ -34,7 +34,7 @@ def test_summary_goes_to_stderr(alloc, small):
     """Without --json the summary stands on standard error: status, figures, the last task and what would help."""
     ran = alloc("solve", "small.json", "--method", "greedy")
     assert (ran.code, ran.out) == (0, "")
-    for words in ("small (5 agents, 3 tasks), greedy", "makespan", "energy", "battery", "Last: ", "One more agent"):
+    for words in ("small (5 agents, 3 tasks), greedy", "makespan", "energy", "battery", "Bottleneck: ", "One more agent"):
         assert words in ran.err
 
 
@@ -156,13 +156,13 @@ def test_slack_buys_energy(alloc, small):
     assert loose.json["energy"] < strict["energy"]
     assert loose.json["status"] == "optimal"
     shown = alloc("solve", "small.json", "--objective", "makespan-energy", "--makespan-limit", "9").err
-    assert "optimal, no allocation within 9 has less energy" in shown
+    assert "optimal; no allocation within 9 has less energy" in shown
 
 
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["--makespan-slack", "0.1"], "use it with the objective makespan-energy"),
+        (["--makespan-slack", "0.1"], "needs the objective makespan-energy"),
         (["--makespan-slack", "inf", "--objective", "makespan-energy"], "must be a finite number"),
         (["--makespan-limit", "0", "--objective", "makespan-energy"], "must be a finite number > 0"),
         (
