@@ -180,7 +180,7 @@ def _class(name: str) -> type[Allocator]:
 
 
 def _hint(key: str, method: Method, kind: type[Allocator]) -> str:
-    """Return which of our methods take this option, or which one may be meant and all that there are."""
+    """Return which built-in methods have this option, or else the closest option and all options of this method."""
     found = takers(key)
     if found:
         return f"; {', '.join(found)} {'do' if len(found) > 1 else 'does'}"

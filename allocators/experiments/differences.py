@@ -1,4 +1,7 @@
-"""Paired differences of policies from the first one, on the same missions and seeds, with 95 % intervals."""
+"""Paired differences of policies from the first one, on the same missions and seeds, with 95 % intervals.
+
+They are the same as on the page of `alloc report` for these missions.
+"""
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
@@ -6,7 +9,8 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from alloc.allocators.experiments.policies import PolicyRow
-from alloc.allocators.experiments.statistics import CONFIDENCE
+from alloc.allocators.experiments.statistics import interval
+from alloc.allocators.experiments.sweep import mean
 from alloc.problems import MissionResult
 
 MEASURES = ("mission_time", "priority_done_share", "energy")
@@ -14,16 +18,16 @@ MEASURES = ("mission_time", "priority_done_share", "energy")
 
 @dataclass(frozen=True)
 class Interval:
-    """A mean difference with its 95 % confidence interval (Student's t).
+    """A mean difference with its 95 % BCa bootstrap interval.
 
     Attributes
     ----------
     mean : float or None
         None if there are no pairs.
     low, high : float or None
-        None for a single pair.
+        None for fewer than three pairs.
     pairs : int
-        Missions, or seeds of a single mission, for which both policies have a value.
+        Missions in which both policies have a value for every seed; seeds, if there is only one mission.
     """
 
     mean: float | None
@@ -40,7 +44,7 @@ class PolicyDifference:
     ----------
     policy, against : str
     mission_time, energy : Interval
-        Relative differences: -0.1 is 10 % less. Mission times only of pairs of runs that both did all tasks.
+        Relative differences: -0.1 is 10 % less. Only of pairs in which both policies did all tasks.
     priority_done_share : Interval
         Difference of the two shares.
     """
@@ -62,9 +66,10 @@ class PolicyDifference:
 
 
 def paired_differences(rows: Sequence[PolicyRow]) -> list[PolicyDifference]:
-    """Return the paired differences of each policy from the first one, by mission and seed.
+    """Return the paired differences of each policy from the first one, on the same missions and seeds.
 
-    Runs of one mission are not independent; with several missions, pairs are therefore means over their seeds.
+    A pair is a mission, with means over its seeds, as runs of one mission are not independent. With a single mission, a
+    pair is a seed.
 
     Parameters
     ----------
@@ -81,10 +86,11 @@ def paired_differences(rows: Sequence[PolicyRow]) -> list[PolicyDifference]:
     missions = sorted({row.number for row in rows})
     found = []
     for policy in policies[1:]:
-        pairs = [_pairs(runs.get((policy, number), {}), runs.get((policies[0], number), {})) for number in missions]
-        intervals = {
-            name: paired_interval([[_difference(name, *pair) for pair in some] for some in pairs]) for name in MEASURES
-        }
+        by_mission = [
+            _pairs(runs.get((policy, number), {}), runs.get((policies[0], number), {})) for number in missions
+        ]
+        pairs = [[pair] for pair in by_mission[0]] if len(missions) == 1 else by_mission
+        intervals = {name: paired_interval([_difference(name, some) for some in pairs]) for name in MEASURES}
         found.append(PolicyDifference(policy=policy, against=policies[0], **intervals))
     return found
 
@@ -95,25 +101,26 @@ def _pairs(
     return [(result, theirs[seed]) for seed, result in ours.items() if seed in theirs]
 
 
-def _difference(measure: str, one: MissionResult, other: MissionResult) -> float | None:
-    """Return a relative difference, or the difference of two shares; None if a run lacks the value."""
-    ours, theirs = getattr(one, measure), getattr(other, measure)
+def _difference(measure: str, pairs: Sequence[tuple[MissionResult, MissionResult]]) -> float | None:
+    """Return the relative difference of two means, or the difference of two mean shares; None where a run lacks it."""
+    if not pairs:
+        return None
+    ours, theirs = (mean([_figure(measure, pair[side]) for pair in pairs]) for side in (0, 1))
     if ours is None or theirs is None:
         return None
     if measure == "priority_done_share":
-        return float(ours - theirs)
-    return float(ours / theirs - 1) if theirs > 0 else None
+        return ours - theirs
+    return ours / theirs - 1 if theirs > 0 else None
 
 
-def paired_interval(by_mission: Sequence[Sequence[float | None]]) -> Interval:
-    """Return the interval of differences, given by mission and seed; None marks a pair without a value."""
-    from scipy import stats
+def _figure(measure: str, result: MissionResult) -> float | None:
+    """Return a measure of a run; none of the energy where tasks are left, as idling takes none."""
+    value: float | None = getattr(result, measure)
+    return None if measure == "energy" and result.mission_time is None else value
 
-    known = [[value for value in values if value is not None] for values in by_mission]
-    values = known[0] if len(known) == 1 else [float(np.mean(some)) for some in known if some]
-    count = len(values)
-    if count < 2:
-        return Interval(values[0] if values else None, None, None, count)
-    mean = float(np.mean(values))
-    half = float(stats.t.ppf((1 + CONFIDENCE) / 2, count - 1) * np.std(values, ddof=1) / np.sqrt(count))
-    return Interval(mean, mean - half, mean + half, count)
+
+def paired_interval(differences: Sequence[float | None]) -> Interval:
+    """Return the mean of the differences of pairs, with its interval; None where a pair lacks the figure."""
+    values = np.array([value for value in differences if value is not None], dtype=float)
+    low, high = interval(values)
+    return Interval(float(values.mean()) if len(values) else None, low, high, len(values))

@@ -24,9 +24,9 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
+from scipy import stats
 
 from alloc.allocators import Policy, load_policy
-from alloc.allocators.experiments.differences import paired_interval
 from alloc.allocators.online.compiled.run import run_compiled
 from alloc.cli.options import listed
 from alloc.problems import Burst, Mission, MissionParameters, Radio, random_mission
@@ -100,11 +100,11 @@ def column(lines: Sequence[Line], policy: str, measure: str) -> list[float]:
 def against(lines: Sequence[Line], rival: str, measure: str) -> str:
     """Return the mean difference of `gappo` from a rival in per cent, its interval, and pairs left out."""
     pairs = zip(column(lines, "gappo", measure), column(lines, rival, measure), strict=True)
-    found = paired_interval([[None if math.isnan(one / other) else one / other - 1] for one, other in pairs])
-    if found.mean is None or found.high is None:
+    known = [100 * (one / other - 1) for one, other in pairs if not math.isnan(one / other)]
+    if len(known) < 2:
         return "-"
-    left = f" ({len(lines) - found.pairs})" if found.pairs < len(lines) else ""
-    return f"{100 * found.mean:+.1f} ± {100 * (found.high - found.mean):.1f}{left}"
+    left = f" ({len(lines) - len(known)})" if len(known) < len(lines) else ""
+    return f"{np.mean(known):+.1f} ± {stats.t.interval(0.95, len(known) - 1, scale=stats.sem(known))[1]:.1f}{left}"
 
 
 def local(given: argparse.Namespace) -> None:

@@ -5,7 +5,6 @@ import time
 
 import numpy as np
 import pytest
-from scipy import stats
 
 from alloc.allocators import (
     AgentDecider,
@@ -18,6 +17,8 @@ from alloc.allocators import (
     simulate,
 )
 from alloc.allocators.experiments import policies
+from alloc.allocators.experiments.statistics import differences, interval
+from alloc.allocators.experiments.store.outcome import Ending, Outcome
 from alloc.problems import InputError, MissionParameters, random_mission
 
 MISSIONS = [random_mission(MissionParameters(agents=3, tasks=4), seed) for seed in (1, 2, 3)]
@@ -85,21 +86,35 @@ def test_a_policy_that_cannot_be_loaded_is_a_row(monkeypatch):
 
 
 def test_differences_are_paired_by_mission_and_seed():
-    """Over several missions, a pair is the mean over the seeds of one; over one, a seed; with Student's interval."""
+    """Over several missions a pair is a mission with the means over its seeds, over one a seed; with BCa intervals."""
     rows = list(compare_policies(MISSIONS, ["nearest", "random"], [0, 1]))
     (found,) = paired_differences(rows)
-    ratios = [
-        np.mean(
-            [ours.mission_time / theirs.mission_time - 1 for ours, theirs in zip(b.results, a.results, strict=True)]
-        )
-        for a, b in zip(rows[::2], rows[1::2], strict=True)
-    ]
+    ratios = np.array(
+        [b.mission_time_mean / a.mission_time_mean - 1 for a, b in zip(rows[::2], rows[1::2], strict=True)]
+    )
     assert (found.policy, found.against, found.mission_time.pairs) == ("random", "nearest", 3)
     assert found.mission_time.mean == pytest.approx(np.mean(ratios))
-    low, high = stats.t.interval(0.95, 2, np.mean(ratios), stats.sem(ratios))
-    assert (found.mission_time.low, found.mission_time.high) == pytest.approx((low, high))
+    assert (found.mission_time.low, found.mission_time.high) == pytest.approx(interval(ratios))
     (alone,) = paired_differences(rows[:2])
     assert (alone.mission_time.pairs, alone.priority_done_share.mean) == (2, 0.0)
+
+
+def test_differences_are_those_of_the_page():
+    """Mean, interval and number of pairs are those of `alloc report` on the same missions."""
+    rows = list(compare_policies(MISSIONS, ["nearest", "random"], [0, 1]))
+    (found,) = paired_differences(rows)
+    endings = {
+        name: [
+            [Ending(outcome=Outcome.SOLVED, makespan=one.mission_time, energy=one.energy) for one in row.results]
+            for row in rows
+            if row.policy == name
+        ]
+        for name in ("nearest", "random")
+    }
+    for score, own in (("makespan", found.mission_time), ("energy", found.energy)):
+        (theirs,) = differences(endings, score)
+        assert (own.pairs, own.mean) == (theirs.instances, pytest.approx(theirs.mean))
+        assert (own.low, own.high) == pytest.approx((theirs.low, theirs.high))
 
 
 def test_pairs_without_a_figure_are_left_out():
@@ -107,6 +122,7 @@ def test_pairs_without_a_figure_are_left_out():
     (found,) = paired_differences(list(compare_policies(MISSIONS[:1], ["nearest", "idle"])))
     assert (found.mission_time.mean, found.mission_time.pairs) == (None, 0)
     assert (found.priority_done_share.mean, found.priority_done_share.low) == (-1.0, None)
+    assert (found.energy.mean, found.energy.pairs) == (None, 0)  # idling takes none
 
 
 def test_a_stop_ends_the_comparison():
