@@ -187,7 +187,8 @@ def _reasons(result: "Result") -> list[str]:
 def _last_tasks(instance: Instance, found: Bottleneck) -> str:
     ids = [instance.task_ids[j] for j in found.last]
     if len(ids) > 1:
-        return f"Bottleneck: {len(ids)} of {instance.m} tasks together, at {_time(instance, found.makespan)}: {_list(ids)}."
+        end = _time(instance, found.makespan)
+        return f"Bottleneck: {len(ids)} of {instance.m} tasks together, at {end}: {_list(ids)}."
     j = found.last[0]
     group = [instance.agent_ids[i] for i in found.agents]
     ability = float(instance.ability[list(found.agents)].sum())

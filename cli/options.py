@@ -3,6 +3,7 @@
 import re
 from collections.abc import Sequence
 from enum import StrEnum
+from itertools import pairwise
 from typing import Annotated
 
 import typer
@@ -144,7 +145,8 @@ def option_of(place: str, parameters: Sequence[Parameter], arguments: Sequence[s
     """Return the option or argument that sets the parameter `place` of the library, or else `place` itself.
 
     Options that take several values are in the plural: ``seed`` of `solve` is ``--seeds`` of ``alloc compare``.
-    Parameters of a method are set by the ``--set`` among the `arguments` that names them.
+    Parameters of a method are set by the ``--set`` among the `arguments` that names them, or by the list of methods
+    that has them in brackets.
     """
     name = OPTION_NAMES.get(place, place)
     for known in (name, f"{name}s", f"{name.removesuffix('y')}ies"):
@@ -154,6 +156,10 @@ def option_of(place: str, parameters: Sequence[Parameter], arguments: Sequence[s
                 return parameter.opts[0] if is_option else parameter.metavar or known.upper()
     if any(argument.removeprefix("--set=").startswith(f"{place}=") for argument in arguments):
         return f"--set {place}"
+    in_brackets = re.compile(rf"\[(?:[^\]]*,)?\s*{re.escape(place)}=")
+    for option, argument in pairwise(arguments):
+        if option in ("--methods", "--policies") and in_brackets.search(argument):
+            return f"{option}: {place}"
     return place
 
 
@@ -204,8 +210,6 @@ def listed(text: str, option: str) -> dict[str, tuple[str, dict[str, object] | N
             raise typer.BadParameter(f"{label!r} must have the form ga[population=200]", param_hint=f"'{option}'")
         found[label] = (name, values(BETWEEN_SETTINGS.split(settings[:-1])) if bracket else None)
     if not found:
-        see = "see `alloc methods`" if option == "--methods" else f"such as {', '.join(BUILT_IN_POLICIES)}"
-        raise typer.BadParameter(
-            f"names no {'method' if option == '--methods' else 'policy'}; {see}", param_hint=f"'{option}'"
-        )
+        such = "method, such as greedy" if option in ("--methods", "--load") else "policy, such as nearest"
+        raise typer.BadParameter(f"names no {such}", param_hint=f"'{option}'")
     return found

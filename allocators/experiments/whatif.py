@@ -152,7 +152,9 @@ def whatif(
     models = _agents(instance, [like] if isinstance(like, str) else like, "like")
     gone = frozenset(_agents(instance, remove, "remove"))
     if not models and not gone:
-        raise InputError("names no agent; give agents to copy or to remove", "like")
+        raise InputError("needs an agent to add copies of, or agents to remove", "like")
+    if len(gone) == instance.n:
+        raise InputError("leaves no agent; keep at least one", "remove")
     of_type(method, (str, Allocator), "method")
     Budget(time_limit_s, iterations)
     function(on_fleet, "on_fleet")

@@ -121,6 +121,8 @@ def generate_command(
     _check_options(family, wanted)
     if count > 1 and output == STANDARD:
         raise typer.BadParameter("must name a folder for several instances", param_hint="'--output'")
+    if count > 1 and output.lower().endswith((".json", ".npz", ".csv")):
+        raise typer.BadParameter(f"{output!r} is the name of a file; --count needs a folder", param_hint="'--output'")
     for number in range(seed, seed + count):
         _write(_instance(family, wanted, number), output, into_folder=count > 1)
     if output != STANDARD:

@@ -115,7 +115,7 @@ def solve_command(
     from alloc.allocators import solve
     from alloc.cli.output.progress import Progress
     from alloc.problems import InputError
-    from alloc.problems.formats import read_instance, read_plan
+    from alloc.problems.formats import read_instance
 
     read = [("INSTANCE", instance), ("--policy", policy), ("--pin-file", pin_file)]
     check_outputs(("--output", output), ("--plot", plot), read=read)
@@ -134,7 +134,7 @@ def solve_command(
             iterations=iterations,
             target_gap=target_gap,
             seed=seed,
-            start=None if start is None else read_plan(start, problem).assignment(),
+            start=None if start is None else _start(problem, start),
             move_price=move_price,
             pins=_pins(problem, pin, pin_file, quiet=quiet),
             threads=threads,
@@ -145,6 +145,20 @@ def solve_command(
         )
     _save(result, output, plot, json=json, quiet=quiet)
     raise typer.Exit(0 if result.evaluation is not None and not result.evaluation.unserved_tasks else 1)
+
+
+def _start(problem: "Instance", file: str) -> "dict[str, str | None]":
+    """Return the task of each agent in the plan of a file; an error if it has no agent of the instance."""
+    from alloc.problems import Allocation, InputError
+    from alloc.problems.formats import read_plan
+    from alloc.problems.formats.messages import told
+
+    plan = read_plan(file, problem)
+    try:
+        Allocation.carried_over(problem, plan.assignment())
+    except InputError as error:
+        raise told(error, plan.source) from error.__cause__
+    return plan.assignment()
 
 
 def _pins(problem: "Instance", pairs: list[str] | None, file: str | None, *, quiet: bool) -> dict[str, str | None]:

@@ -82,16 +82,26 @@ def table(header: Sequence[str], rows: Sequence[Sequence[str]], *, left: int = 1
     left : int
         Number of leading columns that are left-aligned, as is the last; the others are right-aligned.
     """
-    widths = [max(len(row[column]) for row in [header, *rows]) for column in range(len(header))]
+    widths = [max(columns_of(row[column]) for row in [header, *rows]) for column in range(len(header))]
 
     def line(row: Sequence[str]) -> str:
+        blanks = [" " * (width - columns_of(cell)) for cell, width in zip(row, widths, strict=True)]
         cells = [
-            cell.ljust(width) if column < left else cell.rjust(width)
-            for column, (cell, width) in enumerate(zip(row, widths, strict=True))
+            cell + blank if column < left else blank + cell
+            for column, (cell, blank) in enumerate(zip(row, blanks, strict=True))
         ]
         return "  ".join(cells).rstrip()
 
     return "\n".join([line(header), "  ".join("-" * width for width in widths), *map(line, rows)])
+
+
+def columns_of(text: str) -> int:
+    """Return how many columns of a terminal a text takes: two for a wide character, none for a combining one."""
+    if text.isascii():
+        return len(text)
+    from unicodedata import combining, east_asian_width
+
+    return sum(0 if combining(one) else 2 if east_asian_width(one) in "WF" else 1 for one in text)
 
 
 def is_terminal(stream: TextIO | None) -> bool:

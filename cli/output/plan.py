@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from alloc.cli.output.console import table
+from alloc.cli.output.console import columns_of, table
 from alloc.problems.text import number, short_names
 
 if TYPE_CHECKING:
@@ -53,8 +53,8 @@ def _cells(values: "list[Value]") -> list[str]:
     cells = [short[value] if isinstance(value, str) else _cell(value) for value in values]
     if not any(isinstance(value, tuple) for value in values):
         return cells
-    width = max(map(len, cells))
-    return [cell.ljust(width) for cell in cells]
+    width = max(map(columns_of, cells))
+    return [cell + " " * (width - columns_of(cell)) for cell in cells]
 
 
 def _cell(value: "float | tuple[str, ...] | None") -> str:

@@ -88,7 +88,7 @@ class Folder:
             begin(self.data / "learning.csv", Learned)
             begin(self.data / "others.csv", Solved)
         except OSError as error:
-            raise InputError(f"cannot be made: {error.strerror}", source=str(self.data)) from error
+            raise InputError(f"cannot be made: {str(error.strerror).lower()}", source=str(self.data)) from error
         wanted = self.missing(jobs)
         if wanted:
             note_environment(self.data / "manifest.json")

@@ -3,6 +3,7 @@
 import sqlite3
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
 from alloc.problems import InputError
 from alloc.problems.formats.messages import one_line
@@ -26,6 +27,15 @@ MEANINGS = {
 """Message for each primary error code of SQLite."""
 
 
+def _unopened(path: Path) -> str | None:
+    """Return why a file cannot be opened, where its name tells it."""
+    if path.is_dir():
+        return "is a folder where a file is expected"
+    if not path.parent.exists():
+        return f"there is no folder {one_line(str(path.parent))!r}; create it first"
+    return None
+
+
 @contextmanager
 def explained(path: str) -> Iterator[None]:
     """Convert errors of SQLite within this context into an `InputError` of one line about the file."""
@@ -35,4 +45,6 @@ def explained(path: str) -> Iterator[None]:
         name = str(getattr(error, "sqlite_errorname", ""))
         primary = "_".join(name.split("_")[:2])
         words = MEANINGS.get(primary, f"cannot be used: {one_line(str(error))}")
+        if primary == "SQLITE_CANTOPEN":
+            words = _unopened(Path(path)) or words
         raise InputError(words, source=path) from error

@@ -60,11 +60,11 @@ class RunFiles:
             policy file is that of another format.
         """
         if resume and not self.checkpoint.exists():
-            raise InputError("no such checkpoint; begin a run without resume", source=str(self.checkpoint))
+            raise InputError("no such checkpoint; start without resume", source=str(self.checkpoint))
         if not resume and _is_filled(self.checkpoint):
             self._check_checkpoint()
         if _is_filled(self.policy) and not _is_policy(self.policy):
-            message = "is there already, and no policy file; name another output, or remove it"
+            message = "exists and is not a policy file; name another output, or remove it"
             raise InputError(message, source=str(self.policy))
         if _is_filled(self.policy) and not resume:
             message = "holds a policy, and no checkpoint to resume is beside it; name another output, or remove it"

@@ -102,7 +102,7 @@ def open_study(path: Path, method: str, seed: int) -> "optuna.Study":
         raise
     except Exception as error:  # of Optuna, SQLAlchemy, Alembic or sqlite3, depending on the content of the file
         reason = next(iter(str(error).splitlines()), type(error).__name__)[:100]
-        raise InputError(f"is not a file of studies ({reason})", source=str(path)) from error
+        raise InputError(f"is not a study; name another file ({reason})", source=str(path)) from error
 
 
 def tune(

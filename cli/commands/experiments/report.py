@@ -47,10 +47,15 @@ def report_command(
     It contains tables, statistics, charts, failures, and maps of the plans.
     """
     from alloc.allocators import report_html
+    from alloc.problems.formats import is_standard_output
+    from alloc.problems.text import counted
 
     check_outputs(("--output", output), read=[("STORE", store) for store in stores])
-    if not report_html(stores, output, title=title, against=against, progress=_Progress().tell):
+    count = report_html(stores, output, title=title, against=against, progress=_Progress().tell)
+    if not count:
         note(f"there are no runs in {', '.join(stores)}: {output} is empty")
+    elif not is_standard_output(output):
+        say(f"wrote {output}: {counted(count, 'run')}")
 
 
 class _Progress:

@@ -79,7 +79,7 @@ def plan_command(
     from alloc.problems import read_mission
 
     if not stdio:
-        raise typer.BadParameter("is required: there is no other interface yet", param_hint="'--stdio'")
+        raise typer.BadParameter("is required", param_hint="'--stdio'")
     if mission == "-":
         raise typer.BadParameter("cannot be -: leave it out to read it from the first line", param_hint="MISSION")
     check_outputs(("--state", state), read=[("MISSION", mission)] if mission is not None else [])

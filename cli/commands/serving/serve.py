@@ -98,11 +98,26 @@ def serve_lines(service: "Service") -> None:
 
     arrived: SimpleQueue[str | None] = SimpleQueue()
     threading.Thread(target=read_lines, args=(arrived,), name="alloc-lines", daemon=True).start()
-    lines = RequestLines(service, lambda line: write_out(line + "\n"))
+    failures: list[OSError] = []
+
+    def write(line: str) -> None:
+        """Write an answer; once that fails, end as at the end of the input, as nobody gets the others."""
+        if failures:
+            return
+        try:
+            write_out(line + "\n")
+        except OSError as error:
+            failures.append(error)
+            service.end()
+            arrived.put(None)
+
+    lines = RequestLines(service, write)
     with ended_by_signals(arrived, service.end):
-        while (line := arrived.get()) is not None:
+        while (line := arrived.get()) is not None and not failures:
             lines.take(line)
         service.close()
+    if failures:
+        raise failures[0]
 
 
 def serve_http(service: "Service", host: str, port: int, most_bytes: int) -> None:

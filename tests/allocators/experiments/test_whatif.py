@@ -137,7 +137,7 @@ def test_the_first_fleet_is_the_instance_itself() -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({}, "like: names no agent"),
+        ({}, "like: needs an agent to add copies of"),
         ({"like": "d3"}, "like: no agent 'd3' in instance 'instance' .known: d1, d2"),
         ({"like": ["d1", 3]}, "like: no agent 3"),
         ({"remove": "d1"}, "remove: must be a list of ids of agents"),
@@ -145,7 +145,7 @@ def test_the_first_fleet_is_the_instance_itself() -> None:
         ({"like": "d1", "up_to": 0}, "up_to: "),
         ({"like": "d1", "method": "gredy"}, "method: "),
         ({"like": "d1", "time_limit_s": -1}, "time_limit_s: "),
-        ({"remove": ["d1", "d2"]}, "at least one agent"),
+        ({"remove": ["d1", "d2"]}, "remove: leaves no agent"),
     ],
 )
 def test_wrong_arguments_are_told(arguments: dict[str, object], message: str) -> None:

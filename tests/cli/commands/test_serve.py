@@ -1,7 +1,9 @@
 """``alloc serve``: what cannot be served is one line, with the option that says so."""
 
 import socket
+import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -31,3 +33,15 @@ def test_methods_that_cannot_be_loaded_are_one_line(alloc, load, begin):
     ran = alloc("serve", "--stdio", "--load", load)
     assert (ran.code, ran.out, ran.err.count("\n")) == (2, "", 1)
     assert ran.err.startswith(f"alloc: {begin}")
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="a device that is always full")
+def test_answers_that_cannot_be_written_end_the_service():
+    """On a full disk it ends with one line and exit code 2, and no traceback, though more requests come."""
+    command = [sys.executable, "-m", "alloc", "serve", "--stdio"]
+    with open("/dev/full", "w") as full:
+        ran = subprocess.run(
+            command, input='{"id": 1}\n{"id": 2}\n', stdout=full, stderr=subprocess.PIPE, text=True, timeout=60
+        )
+    line = "alloc: standard output: cannot be written: no space left on device\n"
+    assert (ran.returncode, ran.stderr) == (2, line)

@@ -34,7 +34,14 @@ def test_summary_goes_to_stderr(alloc, small):
     """Without --json the summary stands on standard error: status, figures, the last task and what would help."""
     ran = alloc("solve", "small.json", "--method", "greedy")
     assert (ran.code, ran.out) == (0, "")
-    for words in ("small (5 agents, 3 tasks), greedy", "makespan", "energy", "battery", "Bottleneck: ", "One more agent"):
+    for words in (
+        "small (5 agents, 3 tasks), greedy",
+        "makespan",
+        "energy",
+        "battery",
+        "Bottleneck: ",
+        "One more agent",
+    ):
         assert words in ran.err
 
 
@@ -177,3 +184,11 @@ def test_wrong_slack_is_refused(alloc, small, arguments, words):
     assert (ran.code, ran.out) == (2, "")
     assert words in ran.err
     assert ran.err.count("\n") == 1
+
+
+def test_a_start_for_another_instance_names_its_file(alloc, small):
+    """A plan without any agent of the instance is an error that says which file it is."""
+    document = {"format": "alloc-allocation/1", "assignment": {"z9": None}}
+    Path("other.json").write_text(json.dumps(document))
+    ran = alloc("solve", "small.json", "--start", "other.json")
+    assert (ran.code, ran.err) == (2, "alloc: other.json: assignment: names no agent of instance 'small'\n")

@@ -178,8 +178,8 @@ def test_what_is_wrong_in_any_case_comes_first(alloc, more, message):
 @pytest.mark.parametrize(
     ("more", "message"),
     [
-        (("--output", "small.json"), "small.json: is there already, and no policy file"),
-        (("--output", "tensors"), "tensors: is there already, and no policy file"),
+        (("--output", "small.json"), "small.json: exists and is not a policy file"),
+        (("--output", "tensors"), "tensors: exists and is not a policy file"),
         (("--output", "small.json", "--resume", "--checkpoint", "small.json"), "small.json: is --output and"),
         (("--output", "policy"), "policy: holds a policy, and no checkpoint to resume is beside it"),
         (("--output", "policy", "--init", "policy"), "policy: is --init and --output at once"),

@@ -29,6 +29,13 @@ def test_table_is_aligned():
     assert table(["id", "T"], [["a", "10"], ["bcd", "9"]]) == "id    T\n---  --\na    10\nbcd   9"
 
 
+def test_wide_letters_take_two_columns():
+    """Columns stay aligned beside names in Chinese or with combining accents."""
+    assert table(["id", "T"], [["\u540d\u524d", "1"], ["e\u0301", "2"]]) == (
+        "id    T\n----  -\n\u540d\u524d  1\ne\u0301     2"
+    )
+
+
 def test_streams_without_unicode(monkeypatch):
     """A terminal that cannot show a letter gets its escape instead of an exception."""
     stream = io.TextIOWrapper(io.BytesIO(), encoding="ascii")

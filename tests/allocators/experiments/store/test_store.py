@@ -308,8 +308,10 @@ def test_other_files_are_no_stores(tmp_path):
     with pytest.raises(InputError, match="is a database of another program"):
         Store(tmp_path / "other.db")
     assert (tmp_path / "other.db").read_bytes() == before
-    with pytest.raises(InputError, match="cannot be opened; check the path"):
+    with pytest.raises(InputError, match=r"there is no folder '.*absent'; create it first"):
         Store(tmp_path / "absent" / "runs.db")
+    with pytest.raises(InputError, match="is a folder where a file is expected"):
+        Store(tmp_path)
 
 
 def test_a_damaged_store_is_told(tmp_path):

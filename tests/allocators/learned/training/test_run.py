@@ -84,7 +84,7 @@ def test_a_policy_begins_another(tmp_path: Path) -> None:
         ({"output": "p.pt"}, "has the suffix '.pt'"),
         ({"log": "taken"}, "taken: is there already, and no log"),
         ({"checkpoint": "taken"}, "taken: is there already, and no checkpoint"),
-        ({"output": "taken"}, "taken: is there already, and no policy file"),
+        ({"output": "taken"}, "taken: exists and is not a policy file"),
         ({"turn": "both"}, "turn: must be one of bidding, simultaneous"),
     ],
 )

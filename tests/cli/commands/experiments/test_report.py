@@ -16,12 +16,12 @@ def store(tmp_path, monkeypatch):
     fill(tmp_path / "runs.db", instances=1)
 
 
-def test_the_page_is_written_and_nothing_is_printed(tmp_path, capsys):
+def test_the_page_is_written_and_its_runs_are_counted(tmp_path, capsys):
     """Stores are read, the title is that of the page, and an older page is replaced."""
     (tmp_path / "report.html").write_text("old")
     assert main(["report", "runs.db", "-o", "report.html", "--title", "One & two"]) == 0
     assert "<h1>One &amp; two</h1>" in (tmp_path / "report.html").read_text()
-    assert capsys.readouterr() == ("", "")
+    assert capsys.readouterr() == ("", "wrote report.html: 6 runs\n")
 
 
 def test_a_page_without_runs_has_a_note(tmp_path, capsys):
@@ -35,7 +35,7 @@ def test_progress_is_shown_on_a_terminal(monkeypatch, capsys):
     """Who waits at a terminal is told how far it is, at most once a second."""
     monkeypatch.setattr(report, "is_terminal", lambda stream: True)
     assert main(["report", "runs.db", "-o", "report.html"]) == 0
-    assert capsys.readouterr().err == ""
+    assert capsys.readouterr().err == "wrote report.html: 6 runs\n"
     monkeypatch.setattr(report, "EVERY_S", 0.0)
     assert main(["report", "runs.db", "-o", "report.html"]) == 0
     assert "1 of 1 instances" in capsys.readouterr().err

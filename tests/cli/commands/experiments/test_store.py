@@ -204,7 +204,7 @@ def test_a_full_disk_is_one_line_and_loses_nothing(alloc, plugin):
         (("--store", "runs.db", "--memory", "4"), "must be an amount such as 800M or 4G, got '4'"),
         (("--store", "runs.db", "--memory", "4M"), "must be at least 100M"),
         (("--store", "runs.db", "--kill-after", "0"), "must be more than 0 seconds"),
-        (("--store", "runs.db", "--time-limit", "1", "--workers", "999"), "--workers: 999 timed runs"),
+        (("--store", "runs.db", "--time-limit", "1", "--workers", "999"), "--workers: 999 parallel timed runs"),
         (("--store", "absent/runs.db"), "absent/runs.db: cannot be opened"),
         (("--store", "runs.db", "--report", "runs.txt"), "runs.txt: must end in .md, .tex, .csv or .parquet"),
         (("--store", "runs.db", "--csv", "runs.db"), "is --store and --csv at once"),
