@@ -119,15 +119,21 @@ def generate_command(
     """
     wanted = {name: value for name, value in locals().items() if value is not None and name not in FIXED}
     _check_options(family, wanted)
-    if count > 1 and output == STANDARD:
-        raise typer.BadParameter("must name a folder for several instances", param_hint="'--output'")
-    if count > 1 and output.lower().endswith((".json", ".npz", ".csv")):
-        raise typer.BadParameter(f"{output!r} is the name of a file; --count needs a folder", param_hint="'--output'")
+    if count > 1:
+        _check_folder(output)
     for number in range(seed, seed + count):
         _write(_instance(family, wanted, number), output, into_folder=count > 1)
     if output != STANDARD:
         what = "missions" if family in (Family.MISSION, Family.CFSTP) else "instances"
         say(f"wrote {output}" if count == 1 else f"wrote {count} {what} into {output}")
+
+
+def _check_folder(output: str) -> None:
+    """Raise an error for what cannot be a folder of several files, or is a mistake for one."""
+    if output == STANDARD:
+        raise typer.BadParameter("must name a folder for several instances", param_hint="'--output'")
+    if output.lower().endswith((".json", ".npz", ".csv")):
+        raise typer.BadParameter(f"{output!r} is the name of a file; --count needs a folder", param_hint="'--output'")
 
 
 def _check_options(family: Family, wanted: dict[str, Any]) -> None:
