@@ -98,9 +98,14 @@ class _Worker:
         context = multiprocessing.get_context("spawn")  # a forked process would inherit the locks of other threads
         self._pipe, child_end = context.Pipe()
         self._process = context.Process(target=_serve, args=(child_end,), daemon=True)
-        with _interrupts_blocked():
-            self._process.start()
-        child_end.close()  # so that the pipe is closed when the worker dies, and the parent reads end of file
+        try:
+            with _interrupts_blocked():
+                self._process.start()
+        except BaseException:
+            self._pipe.close()
+            raise
+        finally:
+            child_end.close()  # so that the pipe is closed when the worker dies, and the parent reads end of file
         self.item: int | None = None
         self.exit_code: int | None = None
 

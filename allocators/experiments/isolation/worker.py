@@ -60,24 +60,28 @@ class Worker:
     """
 
     def __init__(self, cores: Cores, threads: int) -> None:
-        self._life, life = socket.socketpair()
-        channel, other = socket.socketpair()
-        self._printed, printed = os.pipe()
-        os.set_blocking(self._printed, False)
-        setup = json.dumps({"path": sys.path, "cores": cores.numbers})
-        inherited = (life.fileno(), other.fileno(), *(lock.fileno() for lock in cores.locks))
-        self._keeper = subprocess.Popen(
-            [sys.executable, "-P", str(Path(__file__).with_name("keeper.py")), *map(str, inherited[:2]), setup],
-            stdin=subprocess.DEVNULL,
-            stdout=printed,
-            stderr=printed,
-            pass_fds=inherited,
-            start_new_session=True,  # Ctrl-C reaches the whole foreground group; the command decides
-            env=dict(os.environ, **dict.fromkeys(THREAD_VARIABLES, str(threads))),
-        )
-        for end in (life, other):
-            end.close()
-        os.close(printed)
+        with contextlib.ExitStack() as ours, contextlib.ExitStack() as theirs:
+            self._life, life = socket.socketpair()
+            channel, other = socket.socketpair()
+            self._printed, printed = os.pipe()
+            ours.callback(os.close, self._printed)
+            theirs.callback(os.close, printed)
+            for own, given in ((self._life, life), (channel, other)):
+                ours.enter_context(own)
+                theirs.enter_context(given)
+            os.set_blocking(self._printed, False)
+            setup = json.dumps({"path": sys.path, "cores": cores.numbers})
+            inherited = (life.fileno(), other.fileno(), *(lock.fileno() for lock in cores.locks))
+            self._keeper = subprocess.Popen(
+                [sys.executable, "-P", str(Path(__file__).with_name("keeper.py")), *map(str, inherited[:2]), setup],
+                stdin=subprocess.DEVNULL,
+                stdout=printed,
+                stderr=printed,
+                pass_fds=inherited,
+                start_new_session=True,  # Ctrl-C reaches the whole foreground group; the command decides
+                env=dict(os.environ, **dict.fromkeys(THREAD_VARIABLES, str(threads))),
+            )
+            ours.pop_all()  # kept, as the process has started; otherwise all descriptors are closed
         self._channel = Connection(channel.detach())
         self._limits, self._tail, self._loaded = Limits(0, 0), b"", False
         self._sent_at = self._checked_at = 0.0
