@@ -9,7 +9,7 @@ from alloc.allocators.contract.tolerance import PROVEN
 from alloc.allocators.explain import Bottleneck, explain
 from alloc.problems import Instance, Objective
 from alloc.problems.evaluation import RELATIVE_TOLERANCE
-from alloc.problems.text import counted, labelled, number, percent
+from alloc.problems.text import counted, labelled, number, one_line, percent
 from alloc.problems.units import labels
 
 if TYPE_CHECKING:
@@ -63,7 +63,7 @@ def summary(result: "Result") -> str:
 def _headline(result: "Result") -> str:
     size = f"{counted(result.instance.n, 'agent')}, {counted(result.instance.m, 'task')}"
     pinned = f" with {counted(len(result.pins), 'agent')} pinned" if result.pins else ""
-    return f"{result.instance.name} ({size}), {result.label}{pinned}: {_status(result)}"
+    return f"{one_line(result.instance.name)} ({size}), {result.label}{pinned}: {_status(result)}"
 
 
 def _status(result: "Result") -> str:
@@ -178,8 +178,8 @@ def _reasons(result: "Result") -> list[str]:
     """Return one line each for the most urgent unserved tasks, with the reason."""
     weights = result.instance.priority
     return [
-        f"  {result.instance.task_ids[one.task]}"
-        f"{f' (priority {number(one.priority)})' if weights.max() > weights.min() else ''}: {one.reason}"
+        f"  {one_line(result.instance.task_ids[one.task])}"
+        f"{f' (priority {number(one.priority)})' if weights.max() > weights.min() else ''}: {one_line(one.reason)}"
         for one in result.unserved[:MOST_REASONS]
     ]
 
@@ -194,12 +194,12 @@ def _last_tasks(instance: Instance, found: Bottleneck) -> str:
     ability = float(instance.ability[list(found.agents)].sum())
     work = labelled(number(float(instance.workload[j])), instance.units.work)
     text = (
-        f"Bottleneck: task {ids[0]} at {_time(instance, found.makespan)}, workload {work}"
+        f"Bottleneck: task {one_line(ids[0])} at {_time(instance, found.makespan)}, workload {work}"
         f" on {'agent' if len(group) == 1 else f'{len(group)} agents:'} {_list(group)} (ability {number(ability)})"
     )
     if found.next_task is None:
         return f"{text}."
-    return f"{text}; next is {instance.task_ids[found.next_task]} at {_time(instance, found.next_time)}."
+    return f"{text}; next is {one_line(instance.task_ids[found.next_task])} at {_time(instance, found.next_time)}."
 
 
 def _gain(instance: Instance, found: Bottleneck) -> str:
@@ -217,7 +217,8 @@ def _gain(instance: Instance, found: Bottleneck) -> str:
     ability = rounded_up(found.enough.ability, whole=bool((instance.ability == instance.ability.round()).all()))
     return (
         f"One more agent there{at_once} gains at most {percent(share)}: with ability {ability} or more,"
-        f" {instance.task_ids[found.next_task]} becomes the last task, at {_time(instance, found.enough.makespan)}."
+        f" {one_line(instance.task_ids[found.next_task])} becomes the last task,"
+        f" at {_time(instance, found.enough.makespan)}."
     )
 
 
@@ -247,4 +248,4 @@ def _time(instance: Instance, value: float | None) -> str:
 
 def _list(ids: list[str]) -> str:
     more = f" and {len(ids) - MOST_NAMES} more" if len(ids) > MOST_NAMES else ""
-    return ", ".join(ids[:MOST_NAMES]) + more
+    return ", ".join(map(one_line, ids[:MOST_NAMES])) + more

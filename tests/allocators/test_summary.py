@@ -109,3 +109,13 @@ def test_what_is_printed_is_short(scenario: int) -> None:
         assert len(printed) < 15
         assert max(map(len, printed)) < 250
         assert len(repr(one).splitlines()) == 1
+
+
+def test_names_cannot_break_lines():
+    """Line breaks and control characters in names are spaces in the summary."""
+    instance = Instance(agent_ids=["a\n1", "b\x1b[2J"], task_ids=["t\r1", "u\n"], ability=[1, 3], workload=[2, 3])
+    text = summary(solve(instance, "greedy", handle_signals=False))
+    assert "\x1b" not in text
+    assert "\r" not in text
+    plain = Instance(agent_ids=["a 1", "b [2J"], task_ids=["t 1", "u"], ability=[1, 3], workload=[2, 3])
+    assert len(text.splitlines()) == len(summary(solve(plain, "greedy", handle_signals=False)).splitlines())
