@@ -1,4 +1,4 @@
-"""Games laid out for tests, at one reference makespan and one weight of energy."""
+"""Boards for tests, with one reference makespan and one weight of energy."""
 
 import numpy as np
 
@@ -35,19 +35,19 @@ EXTREMES = {
 
 
 def layout(*instances: Instance, hours: float = 1.0, energy_weight: float = 0.5, seed: int = 0, **options) -> Board:
-    """Lay out games on `instances`; further options are those of `make_board`."""
+    """Return a board of games on `instances`; further options are those of `make_board`."""
     size = len(instances)
     return make_board(instances, [hours] * size, [energy_weight] * size, np.random.default_rng(seed), **options)
 
 
 def state_of(board: Board, plan: np.ndarray) -> State:
-    """Return the state after all agents have gone where `plan`, shape (n,), sends them; they must be able to."""
+    """Return the state after all agents have moved as in `plan`, shape (n,), which must be feasible."""
     places = np.where(plan < 0, board.places - 1, plan)
     slot = ((board.candidates == board.candidates.new_tensor(places)[None, :, None]) & board.legal).int().argmax(2)
     return step(board, reset(board), slot)
 
 
 def plan_of(board: Board, state: State, game: int = 0) -> Allocation:
-    """Return where everybody is in one game."""
+    """Return the allocation in one game."""
     task = current_tasks(board, state)[game].numpy()
     return Allocation(np.where(task == board.places - 1, -1, task))

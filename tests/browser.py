@@ -1,4 +1,4 @@
-"""Pages in a headless browser: what a script at the end of a page finds there."""
+"""Evaluation of scripts on pages in a headless browser."""
 
 import json
 import re

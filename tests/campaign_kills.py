@@ -1,4 +1,4 @@
-"""Two commands work on one store and are killed at random moments: what becomes of their runs."""
+"""Stress test of a store: two commands work on it and are killed at random times."""
 
 import os
 import random
@@ -55,7 +55,7 @@ class Killed:
 
 
 def kill_often(folder, *, seeds, kills, nap_s, workers=2, gap_s=(0.0, 3.0), signals=SIGNALS, seed=0):
-    """Compare with two commands until all is done, after so many of them were killed, and check what is left."""
+    """Run comparisons by two commands, killed repeatedly, until all runs are complete, and check the store."""
     for number, handler in ((signal.SIGINT, signal.default_int_handler), (signal.SIGHUP, signal.SIG_DFL)):
         if signal.getsignal(number) is signal.SIG_IGN:  # in the background of a shell, or by nohup
             signal.signal(number, handler)
@@ -127,7 +127,7 @@ def _judged(folder, wanted, kills, stubborn, seconds):
 
 
 def _overlapping(begun, ended):
-    """Return how many runs began in one process while the same run was still to end in another."""
+    """Return how many runs started in one process while the same run was in progress in another."""
     count = 0
     for name, seed, pid, at in begun:
         ends = [(end, other) for end, other in ended.get((name, seed), []) if other != pid]

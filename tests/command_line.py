@@ -1,4 +1,4 @@
-"""What the command line takes, without running it: lines of documents and of help are held against its own parser."""
+"""Validation of command lines in documents and help by the parser, without running them."""
 
 import re
 import shlex
@@ -15,7 +15,7 @@ USAGE_ERROR: type[Exception] = typer.BadParameter.__mro__[1]
 
 
 def understand(line: str) -> int:
-    """Parse every `alloc` command of a line of a shell; return how many they are, or raise a `USAGE_ERROR`."""
+    """Parse every `alloc` command in a shell line; return their number, or raise a `USAGE_ERROR`."""
     calls = [part.split(">")[0].removesuffix(" 2") for part in re.split(r"[|;]|&&", line)]
     found = [words for words in (shlex.split(call, comments=True) for call in calls) if words and words[0] == "alloc"]
     for _, name, *words in found:

@@ -1,4 +1,4 @@
-"""Fixtures for all tests: tiny named instances, and how hypothesis runs."""
+"""Fixtures for all tests: tiny named instances, and settings of hypothesis."""
 
 import signal
 from collections.abc import Iterator
@@ -19,27 +19,27 @@ settings.load_profile("alloc")
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """Add an option that has answers compared with a reference more often than usual."""
+    """Add an option for the number of random comparisons with references."""
     text = "instances or missions that are drawn where answers are compared with a reference, instead of a few"
     parser.addoption("--draws", type=int, metavar="N", help=text)
 
 
 def pytest_runtest_setup(item: pytest.Item) -> None:
-    """Skip a test that is marked as in need of a package that is not there."""
+    """Skip a test that is marked as needing a missing package."""
     for mark in item.iter_markers("needs"):
         pytest.importorskip(*mark.args)
 
 
 @pytest.fixture(autouse=True, scope="session")
 def interruptible() -> None:
-    """Let Ctrl-C through: a shell that runs the tests in the background has them ignore it, and what they start."""
+    """Restore the handling of Ctrl-C, which shells disable for tests in the background and their child processes."""
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.fixture(autouse=True, scope="session")
 def valid_documents() -> Iterator[None]:
-    """Hold every instance and allocation that is written as JSON in a test against the schema of its format."""
+    """Validate every instance and allocation that a test writes as JSON against the schema of its format."""
     with pytest.MonkeyPatch.context() as patch:
         write = json_text.lines
 
@@ -96,7 +96,7 @@ def small(tmp_path: Path) -> Instance:
 
 @pytest.fixture
 def unservable(tmp_path: Path) -> Instance:
-    """Nobody can take t2; in unservable.json."""
+    """No agent can take t2; in unservable.json."""
     instance = Instance(name="unservable", ability=[2, 3], workload=[4, 6], allowed_tasks=[[0], [0]])
     write_instance(instance, tmp_path / "unservable.json")
     return instance

@@ -1,4 +1,4 @@
-"""Random small missions of every kind, and orders that nobody sensible would give: for laws that always hold."""
+"""Random small missions of every kind, and random orders, for tests of invariants."""
 
 from typing import Any
 
@@ -20,7 +20,7 @@ def missions(draw: st.DrawFn) -> Mission:
 
 
 def random_mission_of_any_kind(rng: np.random.Generator, *, bases: bool = False) -> Mission:
-    """Return a mission whose every setting is drawn; with `bases`, some of the agents that return do so to a base."""
+    """Return a mission with all settings random; with `bases`, some of the returning agents return to a base."""
 
     def chance(share: float = 0.5) -> bool:
         return bool(rng.random() < share)
@@ -91,7 +91,7 @@ def _instance(rng: np.random.Generator, n: int, m: int) -> Instance:
 
 
 def _events(rng: np.random.Generator, n: int, m: int) -> list[Event]:
-    """Return events of every kind that are possible after hour 3, when all have joined and appeared."""
+    """Return possible events of every kind after hour 3, when all agents and tasks exist."""
     events = []
     for i in range(n):
         name, hours = f"a{i + 1}", sorted(rng.uniform(3, 10, 3).tolist())
@@ -116,7 +116,7 @@ def _events(rng: np.random.Generator, n: int, m: int) -> list[Event]:
 
 
 def run_wildly(mission: Mission, seed: int = 0) -> Simulation:
-    """Simulate a mission under orders drawn at random: to any task, possible or not, to places, to stay."""
+    """Simulate a mission under random orders: to any task, feasible or not, to places, or to stay."""
     simulation, rng = Simulation(mission, seed=seed), np.random.default_rng(seed)
     tasks = mission.instance.task_ids
     while (request := simulation.advance()) is not None:

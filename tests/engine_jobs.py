@@ -1,4 +1,4 @@
-"""Functions that the tests of the engines run in other processes, which find them by their name.
+"""Functions that tests of engines run in other processes, which import them by name.
 
 Torch, which takes a process a second to load, is left to those that need it.
 """
@@ -16,13 +16,13 @@ if TYPE_CHECKING:
 
 
 def square(item: int) -> int:
-    """Take longer for the first items, so that they are not the first to end."""
+    """Return the square, taking longer for the first items, so that these do not end first."""
     time.sleep(0.02 if item < 2 else 0)
     return item * item
 
 
 def step(state: dict[str, torch.Tensor]) -> dict[str, torch.Tensor]:
-    """Multiply a seeded random matrix often enough for the last bits to show how it was computed."""
+    """Multiply a seeded random matrix repeatedly, so that the last bits depend on the computation."""
     import torch
 
     from alloc.allocators.runtime.torch_state import torch_threads
@@ -49,7 +49,7 @@ def fail_oddly(item: int) -> int:
 
 
 def die_first(item: tuple[int, str]) -> tuple[int, int]:
-    """Kill the process where the marker is missing; else return the number squared and the process."""
+    """Kill the process if the marker is missing; otherwise return the square and the process id."""
     number, marker = item
     if number % 2 and not Path(marker).exists():
         Path(marker).touch()
@@ -58,14 +58,14 @@ def die_first(item: tuple[int, str]) -> tuple[int, int]:
 
 
 def die(item: str) -> None:
-    """Leave a line for every try, and die."""
+    """Record every attempt, and kill the process."""
     with Path(item).open("a") as file:
         file.write("tried\n")
     os.kill(os.getpid(), signal.SIGKILL)
 
 
 def sleep_long(item: str) -> None:
-    """Leave the process id in a file, whole from the beginning, and sleep."""
+    """Write the process id to a file atomically, and sleep."""
     path = Path(item)
     path.with_suffix(".part").write_text(str(os.getpid()))
     path.with_suffix(".part").rename(path)
@@ -78,7 +78,7 @@ def pid(item: int) -> int:
 
 
 def square_where_it_is_safe(item: tuple[int, str]) -> int:
-    """Leave a file for every try, with the machine in it, and end only where the machine is not the doomed one."""
+    """Record the machine of every attempt, and return only on a machine that is not to be killed."""
     import ray
 
     number, folder = item

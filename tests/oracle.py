@@ -1,4 +1,4 @@
-"""The optimum by brute force, from the definitions alone: nothing of it comes from the code that it checks."""
+"""The optimum by brute force, from the definitions, independent of the code that it checks."""
 
 from dataclasses import dataclass
 from functools import lru_cache
@@ -32,7 +32,7 @@ class Optimum:
 
 @lru_cache(1024)  # of an instance that is solved by many methods, once
 def brute_force(instance: Instance) -> Optimum:
-    """Try all (m + 1)^n allocations; those that send an agent where it cannot go are left out."""
+    """Enumerate all (m + 1)^n allocations, without those that assign an agent to a task that it cannot take."""
     plans, unserved, lost, makespan, energy = _scored_plans(instance)
     few = unserved == unserved.min()
     few &= lost <= lost[few].min() * (1 + 1e-12)
@@ -53,7 +53,7 @@ def least_energy_within(instance: Instance, makespan: float) -> float:
 def _scored_plans(
     instance: Instance,
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], FloatArray, FloatArray, FloatArray]:
-    """Return all plans that send nobody astray: unserved tasks, the priority of these, makespan, and energy of each."""
+    """Return all feasible plans with the unserved tasks, their priority, makespan, and energy of each."""
     distance, able = reachable(instance)
     energy_of = flight_energies(instance, distance)
     options = [[-1, *np.flatnonzero(row).tolist()] for row in able]
@@ -64,7 +64,7 @@ def _scored_plans(
 
 
 def reachable(instance: Instance) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Return distances (1), shape (n, m), and who can take what, agent by agent, and be back at its base."""
+    """Return distances (1) and reachability, shape (n, m), including the return to bases."""
     distance, able = np.zeros((instance.n, instance.m)), np.ones((instance.n, instance.m), dtype=bool)
     for i in range(instance.n):
         for j in range(instance.m):
@@ -92,7 +92,7 @@ def flight_energies(instance: Instance, distance: FloatArray) -> FloatArray:
 
 
 def _way_home(instance: Instance, i: int, j: int) -> tuple[float, bool]:
-    """Return how far it is from task j to where agent i returns, and whether a table gives that."""
+    """Return the distance from task j to the place to which agent i returns, and whether a table gives it."""
     base, table = int(instance.return_base[i]), instance.distances
     if base < 0:
         return _distance(instance, i, j, back=True)
@@ -106,7 +106,7 @@ def _way_home(instance: Instance, i: int, j: int) -> tuple[float, bool]:
 
 
 def _distance(instance: Instance, i: int, j: int, *, back: bool = False) -> tuple[float, bool]:
-    """Return how far task j is from where agent i starts, or the way back, and whether a table gives that."""
+    """Return the distance from the start of agent i to task j, or back, and whether a table gives it."""
     starts_at_task = np.isnan(instance.agent_position[i]).any() and instance.start_task[i] >= 0
     start = int(instance.start_task[i]) if starts_at_task else None
     place = instance.agent_position[i] if start is None else instance.task_position[start]
@@ -124,7 +124,7 @@ def _distance(instance: Instance, i: int, j: int, *, back: bool = False) -> tupl
 
 
 def _by_metric(instance: Instance, place: FloatArray, goal: FloatArray) -> float:
-    """Return the distance of two places, 0 where one is unknown."""
+    """Return the distance between two places, 0 if one is unknown."""
     if np.isnan(place).any() or np.isnan(goal).any():
         return 0.0
     if instance.metric == "manhattan":

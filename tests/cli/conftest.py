@@ -28,7 +28,7 @@ Run = Callable[..., Ran]
 
 @pytest.fixture
 def alloc(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Run:
-    """Runs the command line in this process, in an empty folder; what it writes is held against the schemas."""
+    """Runs the command line in this process, in an empty folder, and validates written documents by the schemas."""
     monkeypatch.chdir(tmp_path)
 
     def run(*arguments: str, stdin: str = "") -> Ran:
@@ -45,12 +45,12 @@ def alloc(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, t
 
 
 def changes(folder: Path) -> set[tuple[Path, int]]:
-    """Return the JSON files in a folder, and when each was written."""
+    """Return the JSON files in a folder, with their modification times."""
     return {(path, path.stat().st_mtime_ns) for path in folder.glob("*.json") if path.is_file()}
 
 
 def parsed(text: str) -> object:
-    """Return the value of a JSON text, None where it is something else."""
+    """Return the value of a JSON text, None if it is not JSON."""
     try:
         return json.loads(text)
     except ValueError:

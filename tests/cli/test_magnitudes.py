@@ -1,4 +1,4 @@
-"""Numbers at the ends of what floats hold, through all commands: one line at the door, or a clean answer."""
+"""Extreme numbers through all commands: a one-line error, or a finite result."""
 
 import json
 import math
@@ -20,7 +20,7 @@ VALID = st.one_of(st.sampled_from([fields.LEAST, 1e-30, 1e-9, 1.0, 3.0, 1e9, 1e3
 
 @st.composite
 def documents(draw: st.DrawFn, size: st.SearchStrategy[float], limit: st.SearchStrategy[float]) -> dict[str, Any]:
-    """Draw an instance file: two or three agents and tasks, of such sizes and limits."""
+    """Draw an instance file with two or three agents and tasks, and extreme sizes and limits."""
     place = st.one_of(
         st.none(), st.lists(st.one_of(st.just(0.0), size, size.map(lambda x: -x)), min_size=2, max_size=2)
     )
@@ -54,7 +54,7 @@ def documents(draw: st.DrawFn, size: st.SearchStrategy[float], limit: st.SearchS
 
 
 def finite(value: Any) -> bool:
-    """Whether no number in a JSON value is infinite or NaN."""
+    """Return whether all numbers in a JSON value are finite."""
     if isinstance(value, dict):
         return all(map(finite, value.values()))
     if isinstance(value, list):
@@ -63,7 +63,7 @@ def finite(value: Any) -> bool:
 
 
 def check(alloc, document: dict[str, Any], *, valid: bool) -> None:
-    """Run the commands on a file; the first of them tells whether the file is taken."""
+    """Run the commands on a file; the first one determines whether the file is valid."""
     Path("x.json").write_text(json.dumps(document))
     ran = alloc("validate", "x.json")
     if ran.code == 2:
@@ -100,7 +100,7 @@ SLOW = settings(
 @SLOW
 @given(documents(VALID, SIZES))
 def test_sizes_within_the_limits(alloc, document: dict[str, Any]) -> None:
-    """Any mixture of what is valid gets finite answers from all commands, without a warning."""
+    """Any combination of valid values gives finite results in all commands, without warnings."""
     check(alloc, document, valid=True)
 
 
@@ -115,5 +115,5 @@ MIXED: dict[str, Any] = {
 @given(documents(SIZES, SIZES))
 @example(MIXED)
 def test_sizes_beyond_the_limits(alloc, document: dict[str, Any]) -> None:
-    """Whatever floats a file holds, it is refused in one line, or all commands get along with it."""
+    """A file with any floats is refused in one line, or handled by all commands."""
     check(alloc, document, valid=False)

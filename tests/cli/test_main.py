@@ -30,7 +30,7 @@ def test_help_names_every_command_and_loads_no_numpy():
 
 
 def test_what_a_command_does_fits_a_line_of_the_list():
-    """No line of the list is cut off, and no two commands have the same one: a second name says so."""
+    """Summaries in the list of commands fit on a line and differ."""
     listed = python("-m", "alloc", "--help", COLUMNS="80").stdout.split("Commands:\n")[1].split("\n\n")[0]
     lines = dict(line.split(maxsplit=1) for line in listed.splitlines())
     assert not [line for line in lines.values() if line.endswith("...")]
@@ -39,14 +39,14 @@ def test_what_a_command_does_fits_a_line_of_the_list():
 
 
 def test_commands_are_found():
-    """The checks of every command go through the commands there are, and those of readers through the readers."""
+    """The parametrised checks cover all commands and all readers."""
     assert {"solve", "train"} < set(COMMANDS)
     assert {"solve", "compare", "convert"} < set(READERS) < set(COMMANDS)
 
 
 @pytest.mark.parametrize("command", COMMANDS)
 def test_each_help_has_examples(alloc, command):
-    """Every command's help shows how it is called, in lines that the command line takes."""
+    """The help of every command has valid examples."""
     ran = alloc(command, "--help")
     assert ran.code == 0
     examples = [line for line in ran.out.split("Examples:")[1].splitlines() if line.strip().startswith("alloc ")]
@@ -59,20 +59,20 @@ def test_each_help_has_examples(alloc, command):
     "line", ["alloc sulve x.json", "alloc solve x.json --nonsense", "cat | alloc solve x --seed a"]
 )
 def test_examples_that_are_wrong_are_noticed(line):
-    """A command, an option or a value that is not there does not pass for an example."""
+    """Examples with unknown commands, options or values are detected."""
     with pytest.raises(USAGE_ERROR):
         understand(line)
 
 
 @pytest.mark.parametrize("command", COMMANDS)
 def test_every_option_is_explained(command):
-    """Every argument and option of every command has words of its own in the help."""
+    """Every argument and option of every command has a help text."""
     assert [one.name for one in COMMANDS[command].params if not getattr(one, "help", None)] == []
 
 
 @pytest.mark.parametrize("command", COMMANDS)
 def test_options_that_are_not_there_are_one_line(alloc, command):
-    """Every command refuses an option that it does not have, with one line, and does nothing."""
+    """Every command refuses unknown options in one line, and does nothing."""
     ran = alloc(command, "--nonsense")
     assert (ran.code, ran.out) == (2, "")
     assert ran.err.startswith("alloc: ")
@@ -204,7 +204,7 @@ def test_bad_usage_is_one_line(alloc, small, arguments):
     ],
 )
 def test_the_parameters_of_the_library_are_told_as_options(alloc, small, arguments, begin):
-    """What the library says of a parameter, the command line says of its own option or argument."""
+    """Errors about parameters of the library name the option or argument of the command."""
     ran = alloc(*arguments)
     assert ran.code == 2
     assert ran.err.startswith(f"alloc: {begin}")
@@ -228,13 +228,13 @@ def test_the_parameters_of_the_library_are_told_as_options(alloc, small, argumen
     ],
 )
 def test_values_of_set_are_numbers_or_text(text, value):
-    """What --set takes is a number, several, a truth value or nothing where it looks like that, else text."""
+    """Values of --set are parsed as numbers, tuples, booleans or None, or else are text."""
     (found,) = options.values([f"name={text}"]).values()
     assert (found, type(found)) == (value, type(value))
 
 
 def test_set_reaches_the_method(alloc, small, monkeypatch):
-    """--set NAME=VALUE, which may be repeated, arrives at `solve` beside the options that have their own name."""
+    """--set NAME=VALUE, which may be repeated, is passed to `solve` with the other options."""
     given = {}
 
     def record(*arguments, **settings):
@@ -247,13 +247,13 @@ def test_set_reaches_the_method(alloc, small, monkeypatch):
 
 
 def test_places_in_a_file_are_no_options(alloc):
-    """A field of a file that is called as an option is stays the field that it is."""
+    """A field of a file with the name of an option is not reported as the option."""
     Path("bad.json").write_bytes(instance_of(b'"ability": 1').replace(b"{", b'{"tau": 2, ', 1))
     assert alloc("solve", "bad.json").err.startswith("alloc: bad.json: tau: must lie")
 
 
 def test_no_memory_is_bad_input(alloc, small, monkeypatch):
-    """An instance that is too large for this machine is no defect."""
+    """An instance that does not fit into memory is bad input, not a defect."""
 
     def fail(*arguments, **options):
         raise MemoryError
@@ -292,7 +292,7 @@ def instance_of(agent: bytes, task: bytes = b'"workload": 1') -> bytes:
 )
 @pytest.mark.parametrize("command", READERS)
 def test_malformed_files_are_one_line_with_the_file(alloc, tmp_path, command, content):
-    """A malformed instance gives exit code 2 and one line that names the file, whatever the command."""
+    """In every command, a malformed instance gives exit code 2 and one line that names the file."""
     Path("bad.json").write_bytes(content)
     more = {
         "convert": ["out.npz"],
@@ -309,7 +309,7 @@ def test_malformed_files_are_one_line_with_the_file(alloc, tmp_path, command, co
 
 
 def test_defects_are_one_line_too(alloc, small, monkeypatch):
-    """An unexpected exception gives one line and a code of its own, the traceback only where it is asked for."""
+    """An unexpected exception gives one line and its own exit code, and the traceback only on request."""
 
     def fail(*arguments, **options):
         raise ZeroDivisionError("in a plugin\nsomewhere")
@@ -339,7 +339,7 @@ def test_exit_codes_of_other_ends(alloc, small, monkeypatch, error, code):
 
 
 def test_names_known_without_numpy_are_those_of_the_registry():
-    """What completion offers without loading numpy is what there is."""
+    """The names for completion, which does not load numpy, are those of the registry."""
     assert set(options.BUILT_IN_METHODS) == {"auto", *BUILT_IN}
     assert ENTRY_POINT_GROUP == "alloc.allocators"
     assert solve_module.EXAMPLES
@@ -355,7 +355,7 @@ def test_names_known_without_numpy_are_those_of_the_registry():
     ],
 )
 def test_completion(words, count, expected):
-    """The shell gets commands and methods, and nothing for paths, which it completes itself."""
+    """Commands and methods are completed; paths are left to the shell."""
     ran = python(
         "-m",
         "alloc.cli",
@@ -368,7 +368,7 @@ def test_completion(words, count, expected):
 
 
 def test_a_reader_that_leaves_is_no_error(small, tmp_path):
-    """With standard output closed early, as by `head`, the run ends quietly and as it would have."""
+    """If standard output is closed early, as by `head`, the run ends normally without messages."""
     process = subprocess.Popen(
         [sys.executable, "-m", "alloc.cli", "solve", "small.json", "--method", "greedy", "--json"],
         stdout=subprocess.PIPE,

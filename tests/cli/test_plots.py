@@ -1,4 +1,4 @@
-"""`alloc plot` and `--plot` write a drawing, and print nothing beside it."""
+"""`alloc plot` and `--plot` write a drawing, and print nothing else."""
 
 import json
 import os
@@ -33,7 +33,7 @@ def test_names_of_every_script_are_drawn_without_output(tmp_path):
 
 
 def test_plot_draws_what_solve_drew(alloc, small):
-    """A stored result gives the drawing that --plot made of it, to the last pixel, whether read or piped."""
+    """A stored or piped result gives the identical drawing to that of --plot."""
     ran = alloc("solve", "small.json", "--method", "greedy", "--json", "--output", "r.json", "--plot", "one.png", "-q")
     assert ran.code == 0
     assert alloc("plot", "small.json", "r.json", "--output", "two.png") == type(ran)(0, "", "")
@@ -60,7 +60,7 @@ def test_an_allocation_is_drawn(alloc, small):
     ],
 )
 def test_what_cannot_be_drawn_is_one_line(alloc, small, arguments, message):
-    """An instance in the place of a result, another suffix and clashing files end with exit code 2 and one line."""
+    """An instance instead of a result, an unknown suffix and clashing files give one line and exit code 2."""
     ran = alloc("plot", *arguments)
     assert (ran.code, ran.out, ran.err.count("\n")) == (2, "", 1)
     assert message in ran.err

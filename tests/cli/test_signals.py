@@ -70,7 +70,7 @@ def hard(tmp_path_factory: pytest.TempPathFactory) -> Path:
     ],
 )
 def test_a_signal_ends_the_run_with_the_best_so_far(hard, tmp_path, method, number):
-    """Ctrl-C or SIGTERM in mid-solve prints and saves the best allocation at once, with the usual exit code."""
+    """Ctrl-C or SIGTERM during a run prints and saves the best allocation at once, with the usual exit code."""
     command = ["solve", str(hard), "--method", method, "--time-limit", "60", "--json", "--output", "best.json"]
     process = subprocess.Popen(
         [sys.executable, "-c", LAUNCHER, *command],
@@ -96,7 +96,7 @@ def test_a_signal_ends_the_run_with_the_best_so_far(hard, tmp_path, method, numb
 
 
 def test_ctrl_c_outside_a_run_is_one_line(tmp_path):
-    """While waiting for its input, Ctrl-C ends the command with 130 and a line that there is no result."""
+    """Ctrl-C while waiting for input ends the command with one line and exit code 130."""
     process = subprocess.Popen(
         [sys.executable, "-m", "alloc.cli", "validate", "-"],
         stdin=subprocess.PIPE,
@@ -115,7 +115,7 @@ def test_ctrl_c_outside_a_run_is_one_line(tmp_path):
 
 @pytest.mark.parametrize("module", ["typer", "numpy"])
 def test_ctrl_c_while_modules_are_loaded_is_one_line(tmp_path, module):
-    """Whether the command line itself is still being loaded, or what a run needs, Ctrl-C gives 130 and one line."""
+    """Ctrl-C while modules are loaded gives one line and exit code 130."""
     (tmp_path / f"{module}.py").write_text("import signal; signal.raise_signal(signal.SIGINT)")
     ran = subprocess.run(
         [sys.executable, "-m", "alloc", "solve", "demo.json"],
@@ -127,7 +127,7 @@ def test_ctrl_c_while_modules_are_loaded_is_one_line(tmp_path, module):
 
 
 def test_an_interrupt_in_a_callback_is_not_lost(monkeypatch):
-    """Native code that calls Python, as a compiler does, cannot pass on the exception of Ctrl-C: it comes again."""
+    """Ctrl-C in a callback from native code, which cannot propagate exceptions, is repeated."""
     monkeypatch.setattr(sys, "unraisablehook", sys.unraisablehook)
     repeat_lost_interrupts()
 
@@ -145,7 +145,7 @@ def test_an_interrupt_in_a_callback_is_not_lost(monkeypatch):
 
 
 def test_other_errors_in_a_callback_are_reported(monkeypatch):
-    """Only Ctrl-C is repeated; what else is lost in a callback is reported as before."""
+    """Only Ctrl-C is repeated; other exceptions in callbacks are reported as usual."""
     reported = []
     monkeypatch.setattr(sys, "unraisablehook", lambda unraisable: reported.append(unraisable.exc_type))
     repeat_lost_interrupts()

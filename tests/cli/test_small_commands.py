@@ -1,4 +1,4 @@
-"""validate, convert, methods, and what serve refuses."""
+"""validate, convert, methods, and refusals of serve."""
 
 from pathlib import Path
 
@@ -9,7 +9,7 @@ from alloc.problems.formats import read_instance, to_document
 
 
 def test_validate_tells_what_is_there(alloc, small, unservable):
-    """A valid instance is summed up: sizes, totals, reach, whether all can be served, lower bound."""
+    """A valid instance gets a summary: sizes, totals, reach, whether all tasks can be served, lower bound."""
     ran = alloc("validate", "small.json", "unservable.json", "--json")
     assert ran.code == 0
     first, second = ran.json
@@ -24,7 +24,7 @@ def test_validate_tells_what_is_there(alloc, small, unservable):
 
 
 def test_validate_goes_on_after_a_bad_file(alloc, small):
-    """Each bad file has its own line, and the good ones are still told; the exit code is 2."""
+    """Each invalid file gets a line, and valid ones their summaries; the exit code is 2."""
     Path("bad.json").write_text("{")
     ran = alloc("validate", "bad.json", "small.json", "missing.json")
     assert ran.code == 2
@@ -34,7 +34,7 @@ def test_validate_goes_on_after_a_bad_file(alloc, small):
 
 @pytest.mark.parametrize("target", ["copy.json", "copy.npz", "copy"])
 def test_convert_keeps_everything(alloc, small, target):
-    """Every format holds the same instance."""
+    """Conversion to every format keeps the instance."""
     assert alloc("convert", "small.json", target).code == 0
     assert to_document(read_instance(target)) == to_document(small)
 
@@ -91,7 +91,7 @@ def test_plain_is_short_for_a_parameter(alloc):
 
 
 def test_methods_names_what_is_missing(alloc, monkeypatch):
-    """A method whose packages are not there says how to install them."""
+    """A method with missing packages shows how to install them."""
     monkeypatch.setattr(
         "alloc.allocators.contract.method.find_spec", lambda name: None if name == "ortools" else object()
     )
@@ -101,7 +101,7 @@ def test_methods_names_what_is_missing(alloc, monkeypatch):
 
 
 def test_methods_survives_a_broken_plugin(alloc, monkeypatch):
-    """A plugin that cannot be imported has a row that says so, beside all the others."""
+    """A plugin that cannot be imported has a row with the error."""
     from importlib.metadata import EntryPoint
 
     broken = EntryPoint("broken", "no_such_module:Thing", "alloc.allocators")

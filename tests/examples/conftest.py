@@ -1,4 +1,4 @@
-"""Where the examples and documents lie: in the checkout, which the tests run beside even where the wheel is tested."""
+"""Paths of the examples and documents in the checkout, also when the wheel is tested."""
 
 from pathlib import Path
 

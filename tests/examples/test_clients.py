@@ -1,4 +1,4 @@
-"""The clients in other languages talk to `alloc serve`: node over lines, curl and jq over HTTP, which SIGTERM ends."""
+"""Clients in other languages use `alloc serve`: node over lines, curl and jq over HTTP, ended by SIGTERM."""
 
 import os
 import shutil
@@ -30,7 +30,7 @@ def test_node_over_lines(checkout):
 @pytest.mark.skipif(not all(map(shutil.which, ("curl", "jq"))), reason="curl or jq is not installed")
 @pytest.mark.slow
 def test_clients_over_http(checkout, tmp_path):
-    """A shell and, where it is there, node get plans over HTTP; SIGTERM ends the service with exit code 0."""
+    """A shell and, if installed, node get plans over HTTP; SIGTERM ends the service with exit code 0."""
     ran(
         [*ALLOC, "generate", "random", "--agents", "6", "--tasks", "3", "--seed", "1", "--output", "six.json"],
         cwd=tmp_path,

@@ -1,4 +1,4 @@
-"""What the documents show runs: their Python blocks, and their `alloc` commands; what takes too long is understood."""
+"""Python blocks and `alloc` commands in the documents run; commands that take too long are parsed."""
 
 import io
 import os
@@ -51,21 +51,21 @@ def blocks(text):
 
 
 def runs(block):
-    """Whether there is something in the block that a test of its document runs."""
+    """Return whether a test of the document runs something in the block."""
     return block.is_run and (
         block.language == "python" or (block.language in COMMAND_LANGUAGES and bool(commands(block.code)))
     )
 
 
 def commands(code):
-    """Return the commands that begin with ``alloc``, behind a prompt or not, with the lines that they go on over."""
+    """Return the commands that begin with ``alloc``, with or without a prompt, including continuation lines."""
     joined = code.replace("\\\n", " ")
     lines = (line.removeprefix("$ ").strip() for line in joined.splitlines())
     return [line for line in lines if line.startswith("alloc ")]
 
 
 def shown(text):
-    """Return the commands that a document shows without a test that runs them: indented, or in a block not run."""
+    """Return the commands in a document that are not run: indented, or in a block that is not run."""
     indented = "\n".join(match[1] for match in INDENTED.finditer(FENCE.sub("", text)))
     code = [
         indented,
@@ -76,7 +76,7 @@ def shown(text):
 
 
 def fault(line):
-    """Return what is wrong with a command, or nothing where the parser, the script or the Makefile knows all of it."""
+    """Return the error of a command, or nothing if the parser, the script or the Makefile accepts it."""
     try:
         understand(line)
     except USAGE_ERROR as error:
@@ -117,14 +117,14 @@ def run_by_shell(command, folder):
 
 
 def run_here(command):
-    """Do as `run_by_shell`, in this process, which has loaded all packages: for what means nothing to a shell."""
+    """Do as `run_by_shell`, but in this process, which has loaded all packages; for commands without shell syntax."""
     with redirect_stdout(io.TextIOWrapper(io.BytesIO())), redirect_stderr(io.StringIO()) as errors:
         return main(shlex.split(command)[1:]), errors.getvalue()
 
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
-    """Return an empty folder but for a copy of the examples, and go there."""
+    """Change to a folder with a copy of the examples, and return it."""
     shutil.copytree(ROOT / "examples", tmp_path / "examples", ignore=shutil.ignore_patterns("*.egg-info", "build"))
     monkeypatch.chdir(tmp_path)
     return tmp_path
@@ -148,7 +148,7 @@ def name(path):
 
 
 def test_every_document_is_tested_or_has_nothing_to_run():
-    """What is run and what is parsed, with the documents that are known to have neither, is all of docs/ and README."""
+    """Documents that are run, parsed, or known to have no code, are all of docs/ and README."""
     tested = {name(path) for path in RUN} | {name(path) for path, _ in SHOWN}
     assert {name(path) for path in DOCUMENTS} == tested | WITHOUT_CODE
     assert not tested & WITHOUT_CODE
@@ -176,7 +176,7 @@ def test_document_runs(document, folder):
 
 @pytest.mark.parametrize(("document", "line"), SHOWN, ids=name)
 def test_what_is_not_run_is_understood(document, line):
-    """What takes too long for a test has a command with its options and values, a script or a target that are there."""
+    """Commands that are not run have valid options and values, and scripts and targets that exist."""
     assert fault(line) is None, f"{name(document)}: {line}"
 
 
@@ -191,7 +191,7 @@ def broken_links(text, folder):
 
 
 def test_broken_links_are_noticed():
-    """A link to a file that is not there is told; one to a file, a place in it or another host is not."""
+    """Links to missing files are detected; links to files, anchors and other hosts are accepted."""
     text = "[a](absent.md) [b](test_docs.py) [c](test_docs.py#links) [d](https://example.org/absent.md)"
     assert broken_links(text, Path(__file__).parent) == ["absent.md"]
 
@@ -208,7 +208,7 @@ def test_broken_links_are_noticed():
     ],
 )
 def test_wrong_lines_that_are_not_run_are_noticed(line):
-    """A command, option, script or target that is not there is told, indented or in a block that is not run."""
+    """Unknown commands, options, scripts and targets are detected, indented or in a block that is not run."""
     (found,) = shown(f"# Title\n\n{line}\n")
     assert fault(found) is not None
 
@@ -221,7 +221,7 @@ def test_wrong_python_is_noticed(folder):
 
 
 def test_wrong_command_is_noticed(folder):
-    """A command that fails, also behind a pipe, on a second line or after others, fails its document."""
+    """A failing command fails its document, also after a pipe, on a second line or after other commands."""
     for command in (
         "alloc solve absent.json",
         "alloc solve absent.json --json | cat",

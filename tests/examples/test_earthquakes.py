@@ -1,4 +1,4 @@
-"""The instance on real places is what its script builds and what its README says."""
+"""The instance with real places agrees with its script and its README."""
 
 import runpy
 
@@ -21,7 +21,7 @@ def alaska(folder):
 
 
 def test_script_builds_what_is_committed(folder, tmp_path):
-    """The script writes the same agents and tasks again; only the last digit may depend on the machine."""
+    """The script reproduces the same agents and tasks; only the last digit may depend on the machine."""
     script = runpy.run_path(str(folder / "build.py"))
     script["main"].__globals__["OUTPUT"] = tmp_path / "again.json"
     script["main"]()
@@ -52,7 +52,7 @@ def test_reach_restricts(alaska):
 
 
 def test_search_beats_greedy_by_much(alaska):
-    """Largest ability first ends far above the bound; a short search comes near it."""
+    """Largest ability first is far above the bound; a short search comes close to it."""
     greedy, better = solve(alaska, "greedy"), solve(alaska, "ga", time_limit_s=2)
     assert greedy.gap > 0.15
     assert better.gap < 0.12

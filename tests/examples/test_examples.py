@@ -1,4 +1,4 @@
-"""The example scripts run, in seconds, and print what they are meant to show."""
+"""The example scripts run in seconds, and print the expected output."""
 
 import re
 import subprocess
@@ -27,7 +27,7 @@ def test_solve_from_python(checkout):
 
 @pytest.mark.slow
 def test_replan(checkout):
-    """Few drones move as one drops out, each with a reason; with forty fewer, all is done later."""
+    """Few drones are reassigned when one drops out; with forty fewer, the makespan is longer."""
     printed = run(checkout / "examples" / "replan.py")
     shares = [float(part.split(" %")[0]) for part in printed.split("drones move (")[1:]]
     hours = [float(part.split(" h")[0]) for part in printed.split("done at ")[1:] if " h\n" in part[:12]]
@@ -38,7 +38,7 @@ def test_replan(checkout):
 
 
 def test_ground_station(checkout):
-    """Each order that changes has its cause: a drone that fails, and events for who is sent to the task that came."""
+    """Each changed order has its cause: a failed drone, or a new task."""
     lines = run(checkout / "examples" / "ground_station.py").splitlines()
     assert any("d3: None  (agent d3 failed at 1)" in line for line in lines)
     assert any(re.search(r"d\d: south  \(\w.* at [\d.]+\)", line) for line in lines)
@@ -47,7 +47,7 @@ def test_ground_station(checkout):
 
 @pytest.mark.slow
 def test_train_stable_baselines3(checkout):
-    """A short training of somebody else's PPO on the environment ends with a plan better than chance."""
+    """A short training of a third-party PPO on the environment gives a plan better than random."""
     pytest.importorskip("stable_baselines3")
     output = run(checkout / "examples" / "train_stable_baselines3.py", "--steps", "3000")
     makespan = {line.split()[0]: float(line.split()[3]) for line in output.splitlines()}

@@ -1,4 +1,4 @@
-"""The notebooks: kept as they were executed, small, and without what changes from run to run."""
+"""The notebooks are stored executed, small, and without output that changes from run to run."""
 
 import json
 from pathlib import Path
@@ -11,7 +11,7 @@ MOST_BYTES = 150_000
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.name)
 def test_a_notebook_is_kept_executed(path):
-    """Every cell was run, in order, without an error, and the pictures are small; a journey runs them anew."""
+    """Every cell was run, in order, without an error, and the pictures are small."""
     cells = [cell for cell in json.loads(path.read_text("utf-8"))["cells"] if cell["cell_type"] == "code"]
     assert [cell["execution_count"] for cell in cells] == list(range(1, len(cells) + 1))
     kinds = {output["output_type"] for cell in cells for output in cell["outputs"]}

@@ -1,4 +1,4 @@
-"""Methods that misbehave, for tests of how runs are kept apart; `install` makes a plugin of them."""
+"""Misbehaving methods, for tests of the isolation of runs; `install` makes them a plugin."""
 
 import ctypes
 import os
@@ -55,7 +55,7 @@ def garbage(search):
 
 
 def fork(search):
-    """Leave two processes behind, one of which has a session of its own, and note them."""
+    """Leave two processes behind, one of them in its own session, and record their ids."""
     sleep = [sys.executable, "-c", "import time; time.sleep(600)"]
     children = [subprocess.Popen(sleep), subprocess.Popen(sleep, start_new_session=True)]
     with Path(os.environ["FORKED"]).open("a") as file:
@@ -73,7 +73,7 @@ def freeze(search):
 
 
 def shut(search):
-    """Close all that the process has open, the way by which it would answer too."""
+    """Close all file descriptors of the process, including the one for its answer."""
     os.closerange(0, 256)
     return answer(search)
 
@@ -91,7 +91,7 @@ def missing(search):
 
 
 def nap(search):
-    """Note begin and end, and who it was, so that a test can tell what ran when."""
+    """Record start, end and process id, so that a test can tell what ran when."""
     with Path(os.environ["NAPS"]).open("ab", buffering=0) as file:
         file.write(f"begin {search.instance.name} {search.seed} {os.getpid()} {time.time()}\n".encode())
         time.sleep(float(os.environ.get("NAP_S", "0.05")))
@@ -100,14 +100,14 @@ def nap(search):
 
 
 def busy(search):
-    """Use a processor until the time is up."""
+    """Use a processor until the time limit."""
     while search.stop_reason() is None or search.remaining_s > 0:
         sum(range(1000))
     return answer(search)
 
 
 def pid(search):
-    """Note who it is in the makespan's stead: in the order of its processes."""
+    """Encode the process in the makespan, by the order of processes."""
     with Path(os.environ["NAPS"]).open("a") as file:
         file.write(f"{os.getpid()} {sorted(os.sched_getaffinity(0))}\n")
     return answer(search)
@@ -136,7 +136,7 @@ globals().update({f"method_{name.replace('-', '_')}": kind for name, kind in MET
 
 
 def install(folder):
-    """Put the methods into `folder`, as a plugin of whoever has it on the search path for modules."""
+    """Install the methods into `folder`, as a plugin for processes with this folder on their module search path."""
     (folder / "evil_methods.py").write_text(Path(__file__).read_text())
     information = folder / "evil_methods-1.0.dist-info"
     information.mkdir()

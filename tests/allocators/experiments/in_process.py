@@ -1,4 +1,4 @@
-"""A place for runs in the process of the test: for tests of what is planned, kept and told, at no cost of processes."""
+"""A place that executes runs in the process of the test, for fast tests of planning, storing and reporting."""
 
 import json
 import os

@@ -1,4 +1,4 @@
-"""Stores whose runs are made up, for tests of what is made of them."""
+"""Stores with artificial runs, for tests of reports."""
 
 from dataclasses import replace
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Campaigns: what becomes of runs that crash, hang, eat memory or leave processes behind."""
+"""Campaigns with runs that crash, hang, exhaust memory or leave processes behind."""
 
 import os
 import sqlite3
@@ -23,7 +23,7 @@ INSTANCE = Instance(name="one", ability=[1, 2], workload=[3])
 
 @pytest.fixture
 def plugin(tmp_path, monkeypatch):
-    """Installs the methods that misbehave, and returns a folder for what they note."""
+    """Installs the misbehaving methods, and returns a folder for their records."""
     folder = tmp_path / "plugin"
     folder.mkdir()
     evil_methods.install(folder)
@@ -66,7 +66,7 @@ def is_there(pid):
 
 
 def test_a_run_that_hangs_or_ends_its_process_stops_nobody_else(plugin):
-    """What hangs is ended beyond its limit, what ends its process is noted with its exit code; others are solved."""
+    """A hanging run is killed at its limit, one that exits is recorded with its exit code; others are solved."""
     endings = run(plugin, [job("hang"), job("leave"), job("answer")], workers=1, kill_after_s=0.3)
     assert endings["hang"].outcome is Outcome.HUNG
     assert (endings["leave"].outcome, endings["leave"].exit_code) == (Outcome.EXITED, 3)
@@ -77,7 +77,7 @@ def test_a_run_that_hangs_or_ends_its_process_stops_nobody_else(plugin):
 
 @pytest.mark.slow
 def test_every_way_to_end_is_recorded_and_stops_nobody_else(plugin):
-    """Whatever a method does is recorded as what it is; runs of a good one before and after it are solved."""
+    """Every kind of failure is recorded as such; runs of a good method before and after it are solved."""
     expected = {
         "answer": Outcome.SOLVED,
         "greedy": Outcome.SOLVED,
@@ -112,7 +112,7 @@ def test_every_way_to_end_is_recorded_and_stops_nobody_else(plugin):
 
 
 def test_what_is_there_is_not_run_again(plugin):
-    """A second campaign runs what is missing alone: another seed."""
+    """A second campaign makes only the missing run, of another seed."""
     run(plugin, [job("nap", 0), job("nap", 1)], InProcess())
     run(plugin, [job("nap", seed) for seed in (2, 1, 0)], InProcess())
     ended = [line.split()[2] for line in (plugin / "naps").read_text().splitlines() if line.startswith("end")]
@@ -120,7 +120,7 @@ def test_what_is_there_is_not_run_again(plugin):
 
 
 def test_runs_of_a_method_share_a_process_until_one_ends_badly(plugin):
-    """A process is used again for runs of its method, and another takes its place after a failure."""
+    """A process is reused for runs of its method, and replaced after a failure."""
     run(plugin, [job("pid", 0), job("pid", 1)], workers=1)
     assert len(set((plugin / "naps").read_text().splitlines())) == 1
 
@@ -158,7 +158,7 @@ def test_more_timed_runs_than_processors_are_refused(plugin):
 
 
 def test_a_campaign_that_is_stopped_gives_its_runs_back(plugin, monkeypatch):
-    """After a stop request nothing is running and nothing is leased; what had ended stays."""
+    """After a stop request, no run is in progress or leased; completed runs are kept."""
     monkeypatch.setenv("NAP_S", "0.2")
     stop = threading.Event()
     with Store(plugin / "runs.db") as store:
@@ -171,7 +171,7 @@ def test_a_campaign_that_is_stopped_gives_its_runs_back(plugin, monkeypatch):
 
 
 def test_a_store_that_fails_leaves_no_process_behind(plugin, monkeypatch):
-    """Where a row cannot be written the campaign ends with that error, and so do all of its processes."""
+    """If a row cannot be written, the campaign ends with that error, and all its processes end."""
 
     def fail(self, run, ending, plan):
         raise InputError("the disk is full", source="runs.db")
@@ -186,7 +186,7 @@ def test_a_store_that_fails_leaves_no_process_behind(plugin, monkeypatch):
 
 
 def test_what_auto_may_pick_is_loaded_before_its_time_counts(monkeypatch):
-    """Loops that are compiled for the first time take longer than a run may."""
+    """First compilation takes longer than the limit of a run, and does not count."""
     loaded = []
     monkeypatch.setattr(serve, "load", lambda name, **_: loaded.append(name))
     serve.maker(serve.Order(job("auto").run, {}, b""))

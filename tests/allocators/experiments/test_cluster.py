@@ -1,4 +1,4 @@
-"""Comparisons over a Ray cluster: one command keeps the store, and a machine that dies loses no run."""
+"""Comparisons on a Ray cluster: one command writes the store, and no run is lost if a machine fails."""
 
 import os
 import sqlite3
@@ -32,7 +32,7 @@ SEEDS = 8
 
 
 def test_a_machine_dies_half_way_and_every_run_is_there_once(tmp_path, monkeypatch):
-    """One of two machines is killed with a run under work, which another makes again; each run has one row."""
+    """One of two machines is killed during a run, which another machine repeats; each run has one row."""
     evil_methods.install(tmp_path)
     monkeypatch.setenv("PYTHONPATH", str(tmp_path), prepend=os.pathsep)
     monkeypatch.setenv("NAPS", str(tmp_path / "naps"))
@@ -71,7 +71,7 @@ def ended(path):
 
 @pytest.mark.parametrize(("error", "outcome"), [("WorkerCrashedError", "killed"), ("LocalRayletDiedError", None)])
 def test_only_what_a_run_did_is_held_against_its_method(error, outcome):
-    """A worker that crashed is an outcome; the loss of the cluster, or an error of our own there, ends the command."""
+    """A crashed worker is an outcome; loss of the cluster, or an internal error there, ends the command."""
 
     def get(task):
         raise getattr(ray.exceptions, error)

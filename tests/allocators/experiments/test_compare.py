@@ -11,7 +11,7 @@ PARTLY = Instance(name="partly", ability=[2, 3], workload=[4, 6], allowed_tasks=
 
 
 class BySeed(Allocator):
-    """Puts agents on tasks in a way that depends on the seed, or fails."""
+    """Returns an allocation that depends on the seed, or fails."""
 
     method = Method(name="by-seed", summary="")
 
@@ -40,14 +40,14 @@ def test_mean_and_worst_over_seeds():
 
 
 def test_unserved_tasks_leave_no_makespan():
-    """Where a run leaves a task unserved, no mean over the other runs flatters the method."""
+    """If a run leaves a task unserved, there is no mean over the other runs, which would be biased."""
     (row,) = compare([PARTLY], ["greedy"])
     assert (row.unserved, row.makespan_mean, row.gap_mean, row.statuses) == (1, None, None, "infeasible")
     assert row.energy_mean == 0
 
 
 def test_failures_are_rows():
-    """A method that fails has a row with the reason; the others go on."""
+    """A method that fails has a row with the reason, and the others continue."""
     failed, fine = compare([SMALL], ["by-seed", "greedy"], [9])
     assert failed.reason == "failed with seed 9: ZeroDivisionError: nine"
     assert (failed.runs, fine.runs) == (0, 1)
@@ -67,7 +67,7 @@ def test_auto_tells_what_it_picked():
 
 
 def test_rows_come_as_they_are_done_and_stop_when_asked():
-    """The comparison yields lazily; once stopped, it ends after the rows that are complete."""
+    """Rows are yielded lazily; after a stop request, only complete rows are returned."""
     stop = threading.Event()
     rows = compare([SMALL, PARTLY], ["greedy"], stop=stop)
     assert next(rows).instance == "small"
@@ -76,7 +76,7 @@ def test_rows_come_as_they_are_done_and_stop_when_asked():
 
 
 def test_gaps_share_the_best_bound():
-    """What one method proves counts for all on that instance, and for no other instance of the same name."""
+    """A bound of one method counts for all methods on that instance, but not for another instance of the same name."""
     lists = [[1, 2], [0], [0, 1, 2], [0, 1, 2], [1, 2]]
     hard = Instance(name="one", ability=[6, 7, 6, 5, 5], workload=[12, 8, 5], allowed_tasks=lists)
     easy = Instance(name="one", ability=[2, 2], workload=[1, 1])
@@ -91,7 +91,7 @@ def test_gaps_share_the_best_bound():
 
 
 def test_tracebacks_of_failures_are_logged(caplog, monkeypatch):
-    """A run that fails is a row; what failed where is in the log of `alloc`."""
+    """A failed run is a row; its traceback is in the log of `alloc`."""
 
     def fail(*arguments, **options):
         raise ZeroDivisionError("in a plugin")

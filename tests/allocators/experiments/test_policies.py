@@ -1,4 +1,4 @@
-"""Policies compared in missions: rows, and paired differences with intervals."""
+"""Comparison of policies on missions: rows, and paired differences with intervals."""
 
 import threading
 import time
@@ -60,13 +60,13 @@ def test_a_row_has_means_over_the_seeds():
 
 
 def test_undone_tasks_leave_no_mission_time():
-    """Where a run does not do all, no mean over the others flatters the policy; what is done counts as a share."""
+    """If a run does not do all tasks, there is no mean mission time; the share of tasks done still counts."""
     (row,) = compare_policies(MISSIONS[:1], ["idle"])
     assert (row.mission_time_mean, row.tasks_done_share, row.statuses) == (None, 0.0, "unfinished")
 
 
 def test_refusals_and_failures_are_rows():
-    """A policy that refuses a mission, or fails, has a row with the reason, and the others go on."""
+    """A policy that refuses a mission, or fails, has a row with the reason, and the others continue."""
     refused, failed, fine = compare_policies(MISSIONS[:1], ["replan", Faulty(), "nearest"], [4], knowledge="local")
     assert "needs full knowledge" in refused.reason
     assert failed.reason == "failed with seed 4: ZeroDivisionError: nine"
@@ -74,7 +74,7 @@ def test_refusals_and_failures_are_rows():
 
 
 def test_a_policy_that_cannot_be_loaded_is_a_row(monkeypatch):
-    """A plugin that fails as it is made leaves the figures of the others, as a method does."""
+    """A plugin that cannot be constructed does not affect the results of others."""
 
     def load(name):
         raise ZeroDivisionError("nine")
@@ -118,7 +118,7 @@ def test_differences_are_those_of_the_page():
 
 
 def test_pairs_without_a_figure_are_left_out():
-    """Where a policy did not do all tasks, there is no pair of mission times, but one of shares."""
+    """A policy that did not do all tasks has no pair of mission times, but one of shares."""
     (found,) = paired_differences(list(compare_policies(MISSIONS[:1], ["nearest", "idle"])))
     assert (found.mission_time.mean, found.mission_time.pairs) == (None, 0)
     assert (found.priority_done_share.mean, found.priority_done_share.low) == (-1.0, None)
@@ -126,7 +126,7 @@ def test_pairs_without_a_figure_are_left_out():
 
 
 def test_a_stop_ends_the_comparison():
-    """Once the event is set, no further run begins, and the rows that are done have been given."""
+    """Once the event is set, no further run starts, and complete rows have been yielded."""
     stop = threading.Event()
     rows = compare_policies(MISSIONS, ["idle", "nearest"], stop=stop)
     assert next(rows).policy == "idle"
@@ -155,7 +155,7 @@ def test_a_stop_ends_a_run_within_a_second():
     ],
 )
 def test_wrong_arguments(arguments, place):
-    """What is wrong is an error before the first run, and names the parameter."""
+    """Invalid arguments are an error before the first run that names the parameter."""
     with pytest.raises(InputError) as caught:
         compare_policies(*arguments)
     assert caught.value.place == place

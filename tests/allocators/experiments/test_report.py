@@ -53,7 +53,7 @@ def compared(tmp_path):
 
 
 def test_tables_tell_what_was_compared_and_how_it_ended(compared):
-    """Methods, outcomes, differences of both objectives, profiles and targets; small samples say so."""
+    """Tables show methods, outcomes, differences of both objectives, profiles and targets, and note small samples."""
     tables = {table.title: table for table in report_tables(*compared)}
     assert list(tables) == [
         "Methods",
@@ -81,7 +81,7 @@ def test_tables_tell_what_was_compared_and_how_it_ended(compared):
 
 
 def test_standings_tell_who_is_first_and_how_far_behind_the_others_are(compared):
-    """Who has the best answer, or shares it, is first; late runs never are; behind is told of what served all tasks."""
+    """Methods with the best result, or a tie, are first, late runs never; excess is of runs that serve all tasks."""
     tables = {table.title: table for table in report_tables(*compared)}
     (best, other), beside = tables["Relative to the best known"].rows, tables["Relative to the other methods"].rows
     assert best[:5] == ["a_1", "1", "1", "8 of 8", "0"]
@@ -97,7 +97,7 @@ def test_standings_tell_who_is_first_and_how_far_behind_the_others_are(compared)
 
 
 def test_runs_that_had_to_share_processors_are_told():
-    """Timed runs with little processor time cast doubt on the figures; short, untimed and quick ones do not."""
+    """Timed runs with little processor time cause a warning; short, untimed and quick ones do not."""
     poor = ending(1.0, cores="0", runtime_s=1.0, cpu_s=0.5)
     fine = ending(1.0, cores="0", runtime_s=1.0, cpu_s=0.99)
     others = [ending(1.0, cores="0", runtime_s=0.01, cpu_s=0.001), ending(1.0, runtime_s=1.0, cpu_s=0.1), None]
@@ -119,7 +119,7 @@ def test_markdown_and_latex_hold_the_same_cells(compared, tmp_path):
 
 
 def test_latex_escapes_what_has_a_meaning():
-    """Names of methods may hold anything; braces and environments stay balanced."""
+    """Names of methods may contain any character; braces and environments stay balanced."""
     text = latex([Table("50% of a_b", ["m", "x"], [["a{b}&c$#~^\\", "1"]], ["note"])])
     assert r"a\{b\}\&c\$\#\textasciitilde{}\textasciicircum{}\textbackslash{} & 1 \\" in text
     assert r"\caption{50\% of a\_b. note}" in text
@@ -128,7 +128,7 @@ def test_latex_escapes_what_has_a_meaning():
 
 
 def test_csv_has_a_row_for_each_run(compared, tmp_path):
-    """The columns are the fields of a run and its ending, but for the long ones; None is empty."""
+    """The columns are the fields of a run and its ending, except the long ones; None is empty."""
     write_report(tmp_path / "runs.csv", *compared[:2], lambda: report_tables(*compared))
     rows = list(csv.DictReader(io.StringIO((tmp_path / "runs.csv").read_text())))
     names = [field.name for kind in (Run, Ending) for field in fields(kind)]
@@ -157,7 +157,7 @@ def test_parquet_has_the_traces(compared, tmp_path):
 
 
 def test_files_of_another_kind_are_refused(compared, tmp_path, monkeypatch):
-    """A suffix that is none, a missing package and a folder that is not there are told before anything runs."""
+    """An unknown suffix, a missing package and a missing folder are reported before any run."""
     with pytest.raises(InputError, match=r"must end in \.md, \.tex, \.csv or \.parquet"):
         check_report(tmp_path / "runs.txt")
     with pytest.raises(InputError, match="there is no folder"):
@@ -168,7 +168,7 @@ def test_files_of_another_kind_are_refused(compared, tmp_path, monkeypatch):
 
 
 def test_a_run_that_has_not_ended_has_no_row(compared):
-    """What is still to be made is neither a row of the table nor one of the CSV."""
+    """Runs that have not ended have no rows in the tables or the CSV."""
     plan, endings, _ = compared
     open_ones = {label: [[None, None], *lists[1:]] for label, lists in endings.items()}
     assert [row.instance for row in rows_of(plan, open_ones)] == ["i1", "i1", "i2", "i2", "i3", "i3"]

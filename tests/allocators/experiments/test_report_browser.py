@@ -1,4 +1,4 @@
-"""The page of a report in a browser: it draws, sorts, filters and zooms, in the dark and on a phone."""
+"""The page of a report in a browser: drawing, sorting, filtering and zooming, also in dark mode and on a phone."""
 
 import shutil
 
@@ -115,7 +115,7 @@ def looked_at(folder, tmp_path, script, size, *flags):
 
 
 def test_the_page_sorts_filters_and_zooms(folder, tmp_path):
-    """Rows come in order, missing figures last; filters take text and comparisons; what is stored stays text."""
+    """Rows are sorted with missing values last; filters accept text and comparisons; stored data are shown as text."""
     found = looked_at(folder, tmp_path, STEPPED, "1200,800")
     assert found["charts"] == DRAWN
     assert (found["dark"], found["images"], found["problem"]) == (False, 0, "")
@@ -137,7 +137,7 @@ def test_the_page_sorts_filters_and_zooms(folder, tmp_path):
 
 @pytest.mark.parametrize(("size", "flags"), [("500,900", []), ("1200,800", [DARK])])
 def test_the_page_is_drawn_on_a_phone_and_in_the_dark(folder, tmp_path, size, flags):
-    """All charts are drawn, nothing is wider than the screen, and the page is as dark as the system."""
+    """All charts are drawn, nothing is wider than the screen, and the page follows the system's dark mode."""
     found = looked_at(folder, tmp_path, LOADED, size, *flags)
     assert found["charts"] == DRAWN
     assert found["dark"] == (DARK in flags)

@@ -1,4 +1,4 @@
-"""The page of a report: what is in it, in numbers, and that nothing stored becomes HTML or script."""
+"""The page of a report: its data, and that nothing stored becomes HTML or script."""
 
 import base64
 import gzip
@@ -32,7 +32,7 @@ from alloc.problems import Allocation, InputError, MissingPackageError
 
 @pytest.fixture(autouse=True)
 def without_libraries(monkeypatch):
-    """Bundling the libraries takes seconds, and no test here looks at them."""
+    """Replaces the libraries, which take seconds to bundle and are not tested here."""
     monkeypatch.setattr("alloc.allocators.experiments.report.page.page.libraries", lambda: {"library-vega": ""})
 
 
@@ -75,7 +75,7 @@ def test_the_page_tells_what_was_run_and_how_it_ended(store, tmp_path):
 
 
 def test_means_are_of_the_instances_that_every_method_served(store, tmp_path):
-    """A method that fails where others need long gains nothing by it; without a common instance there are no means."""
+    """A method does not benefit from failing on hard instances; without a common instance there are no means."""
     of = "WHERE method = 'greedy' AND instance {} (SELECT instance FROM instances WHERE name = 'i3')"
     with sqlite3.connect(store) as edited:
         edited.execute("UPDATE runs SET makespan = 100.0, energy = 100.0, runtime_s = 100.0 " + of.format("IN"))
@@ -107,7 +107,7 @@ def test_every_method_is_compared_with_one_where_every_pair_is_too_many(store, t
 
 
 def test_nothing_stored_is_html_or_script(store, tmp_path):
-    """Names and tracebacks with tags stand in the compressed data alone; the title is escaped."""
+    """Names and tracebacks with tags are only in the compressed data; the title is escaped."""
     data = written(store, tmp_path, title=f"All {ANGRY}")
     text = (tmp_path / "report.html").read_text()
     assert ANGRY in data["main"]["instances"]["name"]
@@ -118,7 +118,7 @@ def test_nothing_stored_is_html_or_script(store, tmp_path):
 
 
 def test_runs_are_columns_and_know_their_failures(store, tmp_path):
-    """Each run has its figures at the same place of all columns; a failure that repeats is there once."""
+    """Each run has its values at the same index of all columns; repeated failures are stored once."""
     data = written(store, tmp_path)
     runs, failures = data["runs"], data["main"]["failures"]
     assert {len(column) for column in runs.values()} == {24}
@@ -130,7 +130,7 @@ def test_runs_are_columns_and_know_their_failures(store, tmp_path):
 
 
 def test_maps_hold_places_groups_and_plans(store, tmp_path):
-    """Places come back to three digits; of each method there is the best plan, with its groups and times."""
+    """Places are exact to three digits; each method has its best plan, with groups and times."""
     data = written(store, tmp_path)
     main, detail = data["main"], data["detail-0"]
     number = main["instances"]["name"].index("i1")
@@ -149,7 +149,7 @@ def test_maps_hold_places_groups_and_plans(store, tmp_path):
 
 
 def test_large_instances_are_thinned_and_small_rooms_leave_some_out(store, tmp_path, monkeypatch):
-    """Beyond so many agents and tasks a map has a part of them; without room, instances have no map at all."""
+    """Maps of large instances show a subset of agents and tasks; beyond the size limit, instances have no map."""
     for limit in ("MOST_AGENTS", "MOST_TASKS"):
         monkeypatch.setattr(details_module, limit, 1)
     shown = written(store, tmp_path)["detail-0"]["0"]["map"]
@@ -162,7 +162,7 @@ def test_large_instances_are_thinned_and_small_rooms_leave_some_out(store, tmp_p
 
 
 def test_thinned_traces_reach_the_same_targets():
-    """At every moment that a page draws, a thinned trace has what the whole one has, and it is far shorter."""
+    """A thinned trace agrees with the full one at all times drawn on a page, and is far shorter."""
     rng = np.random.default_rng(1)
     endings = {}
     for label in "ab":
@@ -211,7 +211,7 @@ def test_runs_under_other_conditions_are_told_apart(store, tmp_path):
 
 
 def test_the_plan_of_a_run_is_of_the_store_that_its_record_is_of(tmp_path):
-    """Of a run in two stores the one that ended last counts, with its own plan, whichever store is named first."""
+    """If a run is in two stores, the record that ended last counts, with its plan, whatever the order of the stores."""
     stores = [tmp_path / "early.db", tmp_path / "late.db"]
     for store in stores:
         fill(store, instances=1, methods=["greedy"])
@@ -225,7 +225,7 @@ def test_the_plan_of_a_run_is_of_the_store_that_its_record_is_of(tmp_path):
 
 
 def test_the_time_of_a_mission_stands_for_the_makespan(store, tmp_path):
-    """Runs of policies have measures as JSON; where a mission was not done there is no time."""
+    """Runs of policies have measures as JSON; an unfinished mission has no time."""
     with sqlite3.connect(store) as edited:
         if "measures" not in {row[1] for row in edited.execute("PRAGMA table_info(runs)")}:
             edited.execute("ALTER TABLE runs ADD COLUMN measures TEXT")
@@ -257,7 +257,7 @@ def test_what_there_is_little_of_is_told(tmp_path):
 
 
 def test_a_store_of_the_first_version_has_no_maps(store, tmp_path):
-    """It is read as it is, and is not changed; what it lacks is left out."""
+    """It is read without being changed; missing data are left out."""
     with sqlite3.connect(store) as older:
         older.executescript(
             "DROP TABLE plans; DROP TABLE contents; ALTER TABLE runs DROP COLUMN revision; PRAGMA user_version = 1"
@@ -284,7 +284,7 @@ def test_what_cannot_be_read_or_written_is_an_error(store, tmp_path, monkeypatch
 
 
 def test_progress_is_told(store, tmp_path):
-    """Whoever waits for a long report hears how far it is."""
+    """The progress of a long report is reported."""
     said = []
     report_html([store], tmp_path / "report.html", progress=said.append)
     assert said == ["statistics of 1 of 1 conditions", "4 of 4 instances"]
@@ -292,7 +292,7 @@ def test_progress_is_told(store, tmp_path):
 
 @pytest.fixture
 def foreign_folder():
-    """A folder of somebody else, read by a user without rights to write it, as which this process acts meanwhile."""
+    """A read-only folder of another user; this process acts as a user without write permission meanwhile."""
     with tempfile.TemporaryDirectory() as name:
         folder, own = Path(name), os.geteuid()
         fill(folder / "runs.db", methods=["greedy"])
@@ -308,7 +308,7 @@ NOBODY = 65534
 
 @pytest.mark.skipif(not hasattr(os, "seteuid"), reason="users and their rights are those of POSIX")
 def test_a_store_in_a_folder_that_is_read_only_is_read_unless_somebody_writes_it(foreign_folder):
-    """Runs in the log of a writer are seen where SQLite lets them be; a log alone is an error of one line."""
+    """Runs in the write-ahead log are seen if SQLite can read it; a leftover log is a one-line error."""
     folder, writer, become_another = foreign_folder
     writer.execute("UPDATE runs SET makespan = 7.0")
     writer.commit()

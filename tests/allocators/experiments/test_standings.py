@@ -1,4 +1,4 @@
-"""How methods stand against the best known, and beside each other, on runs worked out by hand."""
+"""Rankings of methods relative to the best known results and to each other, on hand-computed runs."""
 
 import numpy as np
 import pytest
@@ -8,20 +8,20 @@ from alloc.allocators.experiments.store.outcome import Ending, Outcome
 
 
 def solved(makespan, energy=1.0, unserved=0, **others):
-    """Return how a run ended; with tasks unserved its makespan is that of the served ones alone."""
+    """Return an ending; with unserved tasks, its makespan is over the served ones only."""
     whole = None if unserved else makespan
     scores = {"makespan": whole, "served_makespan": makespan, "energy": energy, "unserved": unserved}
     return Ending(outcome=Outcome.SOLVED, **scores, **others)
 
 
 def stand(endings, label, *, energy=False):
-    """Return how a method with a single run stands."""
+    """Return the standing of a method with a single run."""
     (found,) = standings(endings, best_known(endings), None, energy=energy)[label].stands
     return found
 
 
 def test_a_run_that_serves_fewer_tasks_is_not_the_best():
-    """A plan without the task that takes longest has a lesser makespan, no bound to be compared with, and no praise."""
+    """A plan that leaves out the longest task has a shorter makespan, but no comparison with the bound, and loses."""
     endings = {"all": [[solved(2.0, 4.0, lower_bound=1.6)]], "some": [[solved(1.0, 1.0, unserved=1)]]}
     assert best_known(endings) == [Best(1.6, 0, 2.0, 4.0)]
     assert stand(endings, "all").is_least
@@ -41,7 +41,7 @@ def test_where_no_plan_serves_all_tasks_those_that_serve_most_are_compared():
 
 
 def test_runs_are_behind_the_best_of_the_others():
-    """Below 0 a method leads; its energy is compared with those that are no slower."""
+    """Negative values lead; energy is compared with that of methods that are no slower."""
     endings = {"a": [[solved(1.0, 3.0)]], "b": [[solved(2.0, 1.0)]]}
     first, second = stand(endings, "a", energy=True), stand(endings, "b", energy=True)
     assert (first.behind, second.behind) == pytest.approx((-0.5, 1.0))
@@ -50,7 +50,7 @@ def test_runs_are_behind_the_best_of_the_others():
 
 
 def test_late_runs_are_never_first():
-    """An answer beyond the time limit does not win, however good it is; equal answers win both."""
+    """A late result never wins, however good it is; ties both win."""
     late, in_time = solved(1.0, runtime_s=2.0), solved(2.0, runtime_s=1.0)
     endings = {"a": [[late, solved(1.0, runtime_s=1.0)]], "b": [[in_time, solved(1.0 + 1e-12, runtime_s=1.0)]]}
     found = standings(endings, best_known(endings), 1.0, energy=False)

@@ -1,4 +1,4 @@
-"""Statistics of comparisons, against numbers worked out by hand and against what they must not depend on."""
+"""Statistics of comparisons: hand-computed numbers, and invariances."""
 
 import numpy as np
 import pytest
@@ -27,7 +27,7 @@ FAILED = Ending(outcome=Outcome.FAILED)
 
 
 def test_seeds_are_averaged_within_an_instance():
-    """More seeds are no more observations: an instance has one score, the mean, and none where a run has none."""
+    """An instance is one observation, the mean over its seeds, or none if a run has no score."""
     found = scores([[solved(1.0), solved(3.0)], [solved(1.0), FAILED], [solved(1.0), None], [solved(None)]], "makespan")
     np.testing.assert_array_equal(found, [2.0, np.nan, np.nan, np.nan])
     (one,) = differences({"a": [[solved(2.0)] * 9] * 4, "b": [[solved(1.0), solved(2.0), solved(3.0)] * 3] * 4})
@@ -44,7 +44,7 @@ def test_differences_are_relative_and_paired():
 
 
 def test_instances_without_a_score_are_left_out_and_counted():
-    """Where one of two methods failed or left a task unserved there is no pair, which is told."""
+    """If one of two methods failed or left a task unserved, the instance is counted as left out."""
     base = {"a": [[solved(1.0)], [solved(None)], [FAILED], [solved(1.0)]], "b": runs(2, 2, 2, 2)}
     (one,) = differences(base)
     assert (one.instances, one.left_out, one.worse) == (2, 2, 2)
@@ -52,7 +52,7 @@ def test_instances_without_a_score_are_left_out_and_counted():
 
 
 def test_two_scores_of_nothing_are_equal():
-    """Where the agents of both methods stay, both have energy 0, and are equal; what is 1 over 0 is left out."""
+    """Two energies of 0 are equal; ratios of 1 to 0 are left out."""
     endings = {"a": [[solved(1.0, 0.0)]] * 2 + [[solved(1.0, 2.0)]]}
     endings["b"] = [[solved(1.0, 0.0)], [solved(1.0, 1.0)], [solved(1.0, 1.0)]]
     (one,) = differences(endings, "energy")
@@ -61,13 +61,13 @@ def test_two_scores_of_nothing_are_equal():
 
 
 def test_small_samples_are_known_as_such():
-    """Nine instances are few, ten are not."""
+    """Nine instances are a small sample, ten are not."""
     assert differences({"a": runs(*[1] * 9), "b": runs(*[2] * 9)})[0].is_small
     assert not differences({"a": runs(*[1] * 10), "b": runs(*[2] * 10)})[0].is_small
 
 
 def test_wilcoxon_has_the_exact_p_value():
-    """Of six differences of one sign p is 2 / 2^6, with ties or without; zeros are left out; of none there is no p."""
+    """For six differences of one sign p is 2 / 2^6, with or without ties; zeros are left out; none have no p."""
     assert signed_rank(np.arange(1.0, 7.0)) == pytest.approx(2 / 2**6)
     assert signed_rank(np.ones(6)) == pytest.approx(2 / 2**6)
     assert signed_rank(np.array([0.0, 0, *range(1, 7)])) == pytest.approx(2 / 2**6)
@@ -83,7 +83,7 @@ def test_holm_multiplies_by_what_is_left():
 
 
 def test_intervals_hold_the_mean_as_often_as_they_say(monkeypatch):
-    """Of 95 % intervals of thirty skewed values about 95 % hold the true mean, which a normal one misses more often."""
+    """About 95 % of intervals from thirty skewed values contain the true mean, more than of normal intervals."""
     monkeypatch.setattr(statistics, "RESAMPLES", 999)
     rng = np.random.default_rng(7)
     found = [interval(rng.lognormal(size=30)) for _ in range(100)]
@@ -92,6 +92,6 @@ def test_intervals_hold_the_mean_as_often_as_they_say(monkeypatch):
 
 
 def test_intervals_of_equal_values_are_a_point():
-    """Where all instances have the same difference the interval is that; it is the same each time it is asked for."""
+    """If all differences are equal, the interval is that value; intervals are deterministic."""
     assert interval(np.full(5, 0.25)) == (0.25, 0.25)
     assert interval(np.array([1.0, 2.0, 4.0])) == interval(np.array([1.0, 2.0, 4.0]))

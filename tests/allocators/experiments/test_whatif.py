@@ -1,4 +1,4 @@
-"""What more or fewer agents bring."""
+"""The effect of more or fewer agents."""
 
 import re
 import threading
@@ -16,7 +16,7 @@ SEEDS = [seed for seed in range(40) if varied_instance(seed).n <= 4 and all_can_
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_every_fleet_has_the_optimum_of_brute_force(seed: int) -> None:
-    """With copies of an agent, and without another, makespan and energy are the least there are, and proven."""
+    """With copies of an agent, and without another, makespan and energy are optimal and proven."""
     instance = varied_instance(seed)
     gone = [instance.agent_ids[1]] if instance.n > 2 else []
     found = whatif(instance, instance.agent_ids[0], up_to=2, remove=gone, method="milp", objective="makespan-energy")
@@ -34,7 +34,7 @@ def test_every_fleet_has_the_optimum_of_brute_force(seed: int) -> None:
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_makespans_never_rise_with_more_agents(seed: int) -> None:
-    """Even a method that sends agents at random is never slower with one more, nor are its bounds ever higher."""
+    """Even for a random method, more agents never increase the makespan or the bound."""
     instance = varied_instance(seed)
     method = "greedy" if instance.has_travel_time else "ga"
     found = whatif(instance, instance.agent_ids[0], up_to=4, method=method, iterations=1, time_limit_s=None)
@@ -48,7 +48,7 @@ def test_makespans_never_rise_with_more_agents(seed: int) -> None:
 
 
 def test_copies_are_the_same_in_all_but_their_ids() -> None:
-    """A copy has place, limits, skills and own distances of its model, and a new id."""
+    """A copy has the place, limits, skills and given distances of its model, and a new id."""
     instance = Instance(
         ability=[1, 2], workload=[3, 1], agent_ids=["d", "d+1"], agent_position=[[0, 0], [1, 1]], battery=[5, 7],
         task_position=[[2, 0], [3, 0]], skills=[["saw"], []], needs=[["saw"], []], distances=[("d", "t1", 4.0)],
@@ -80,18 +80,18 @@ LINE = Instance(ability=[2, 1], workload=[6], agent_ids=["d1", "d2"], units=Unit
     ],
 )
 def test_the_answer_is_a_sentence(arguments: dict[str, object], expected: str) -> None:
-    """What changes is said against the fleet as it is, with its unit, for the first step and the last."""
+    """The sentence compares the first and the last step with the current fleet, with units."""
     assert whatif(LINE, method="cpsat", **arguments).answer == expected
 
 
 def test_small_changes_have_as_many_digits_as_they_need() -> None:
-    """Two makespans that differ in their fifth digit are not told as equal."""
+    """Two makespans that differ in their fifth digit are not reported as equal."""
     instance = Instance(ability=[1e5, 3.0, 1.0], workload=[1e5])
     assert whatif(instance, "a2", method="cpsat").answer.startswith("one more like a2: 0.99993 instead of 0.99996 (")
 
 
 def test_the_answer_where_tasks_are_unserved_or_nothing_changes() -> None:
-    """Tasks that nobody can serve, and agents that bring nothing, are said; so is that this is proven."""
+    """Tasks that no agent can serve, and agents without effect, are reported, and whether this is proven."""
     few = Instance(ability=[2, 3], workload=[2, 3, 4])
     assert whatif(few, "a2", up_to=2).answer.startswith("one more like a2: every task is served, in 1.333; 2 more")
     assert whatif(few, remove=["a1"]).answer == "without a1: 2 tasks unserved instead of 1"
@@ -101,7 +101,7 @@ def test_the_answer_where_tasks_are_unserved_or_nothing_changes() -> None:
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_the_answer_says_what_is_not_proven(seed: int) -> None:
-    """The change of the optimum lies in the range that is said, by brute force, where the methods prove less."""
+    """If optimality is not proven, the stated range contains the true change, by brute force."""
     instance = varied_instance(seed)
     found = whatif(instance, instance.agent_ids[0], method="greedy", iterations=1, time_limit_s=None)
     now, more = (fleet.result for fleet in found.fleets)
@@ -115,7 +115,7 @@ def test_the_answer_says_what_is_not_proven(seed: int) -> None:
 
 
 def test_stopping_keeps_the_fleets_so_far() -> None:
-    """After a stop request there are the fleets so far, and it says that it is not complete."""
+    """After a stop request, the fleets so far are returned and marked as incomplete."""
     stop, seen = threading.Event(), []
 
     def second(fleet: Fleet) -> None:
@@ -130,7 +130,7 @@ def test_stopping_keeps_the_fleets_so_far() -> None:
 
 
 def test_the_first_fleet_is_the_instance_itself() -> None:
-    """What is compared with is what `solve` finds."""
+    """The first fleet has the result of `solve`."""
     assert whatif(LINE, "d2", method="cpsat").fleets[0].result.makespan == solve(LINE, "cpsat").makespan
 
 
@@ -155,6 +155,6 @@ def test_wrong_arguments_are_told(arguments: dict[str, object], message: str) ->
 
 
 def test_a_method_refuses_as_in_solve() -> None:
-    """What a method cannot do, it says."""
+    """Refusals of the method are raised."""
     with pytest.raises(RefusedError):
         whatif(Instance(ability=[1], workload=[1], speed=[1]), "a1", method="ga")

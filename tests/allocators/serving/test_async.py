@@ -31,7 +31,7 @@ LATEST_S = 5.0
 
 
 def test_answer_is_that_of_solve() -> None:
-    """Two runs at once, awaited while the loop goes on, have the answers that `solve` gives."""
+    """Two parallel runs give the results of `solve` without blocking the event loop."""
 
     async def both() -> list[Result]:
         runs = (solve_async(HARD, "ga", iterations=3, time_limit_s=None, seed=seed) for seed in (0, 1))
@@ -57,7 +57,7 @@ class Exhausted(Allocator):
 
 
 def test_an_exception_that_no_future_holds_is_raised_as_well() -> None:
-    """StopIteration, which asyncio does not take, does not leave the caller waiting for ever."""
+    """StopIteration, which futures cannot hold, does not leave the caller waiting forever."""
     with pytest.raises(RuntimeError, match="StopIteration") as raised:
         asyncio.run(asyncio.wait_for(solve_async(HARD, Exhausted(), time_limit_s=1), 20))
     assert isinstance(raised.value.__cause__, StopIteration)
@@ -78,7 +78,7 @@ def test_improvements_are_told_in_the_loop() -> None:
 
 
 def test_an_exception_from_the_last_improvement_is_not_lost() -> None:
-    """A run that has ended when its only improvement is told still raises what the callback did."""
+    """An exception from a callback is raised even if the run has already ended."""
 
     def enough(_: object) -> None:
         raise KeyError("enough")
@@ -88,7 +88,7 @@ def test_an_exception_from_the_last_improvement_is_not_lost() -> None:
 
 
 def test_event_ends_a_run_with_an_answer() -> None:
-    """A stop event is no cancellation: the best allocation so far comes back."""
+    """Unlike cancellation, a stop event returns the best allocation so far."""
     stop = threading.Event()
     threading.Timer(0.05, stop.set).start()
     result = asyncio.run(solve_async(HARD, "local-search", objective="makespan-energy", stop=stop, time_limit_s=60))
@@ -127,7 +127,7 @@ def test_cancelled_runs_leave_no_thread(name: str) -> None:
 
 @pytest.mark.slow
 def test_cancelled_at_random_moments() -> None:
-    """At 200 random moments, on an instance of the paper's size, all methods end and leave no thread."""
+    """All methods, cancelled at 200 random times on an instance of the paper's size, end and leave no thread."""
     rng, before = random.Random(1), threading.active_count()
     methods = [load(name) for name in registry.BUILT_IN]
     times = []

@@ -1,4 +1,4 @@
-"""The service over HTTP, in this process: statuses, limits, metrics, clients that leave, and a short load."""
+"""The service over HTTP, in this process: statuses, limits, metrics, disconnects, and a short load test."""
 
 import concurrent.futures
 import json
@@ -50,7 +50,7 @@ def client(service):
 
 
 def test_statuses(client):
-    """What is solved is 200, bad input 400, what a method refuses 422, and what is too large 413."""
+    """Solved requests give 200, bad input 400, refusals 422, and bodies that are too large 413."""
     solved = client.post("/solve", json={"id": 1, "instance": EASY})
     assert (solved.status_code, solved.json()["id"], solved.json()["result"]["makespan"]) == (200, 1, 2.0)
     assert client.post("/solve", content=b"{").status_code == 400
@@ -89,7 +89,7 @@ def test_a_client_that_leaves_cancels_its_run(service, client):
 
 
 def test_a_client_that_leaves_within_its_body_is_no_fault(service, client, caplog):
-    """A body that ends too early is given up, without a traceback in the log."""
+    """An incomplete body is discarded, without a traceback in the log."""
     host, port = service.address.removeprefix("http://").split(":")
     with socket.create_connection((host, int(port))) as raw:
         raw.sendall(b"POST /solve HTTP/1.1\r\nHost: x\r\nContent-Length: 100\r\n\r\n{")
@@ -117,7 +117,7 @@ def test_load_is_answered_in_time(service, client):
 
 
 def test_a_full_queue_is_503(service, client):
-    """More requests than run and wait are turned away, with the advice to try again."""
+    """Requests beyond the running and waiting ones are rejected, with the advice to try again."""
     jobs = [service.submit(LONG) for _ in range(9)]
     busy = client.post("/solve", json={"instance": EASY})
     assert (busy.status_code, busy.headers["retry-after"], busy.json()["error"]["kind"]) == (503, "1", "busy")
@@ -127,7 +127,7 @@ def test_a_full_queue_is_503(service, client):
 
 
 def until(is_so):
-    """Wait until it is so, at most 10 s."""
+    """Wait until a condition holds, at most 10 s."""
     limit = time.monotonic() + 10
     while not is_so():
         assert time.monotonic() < limit

@@ -22,7 +22,7 @@ LONG = {"instance": HARD, "method": "local-search", "objective": "makespan-energ
 
 @pytest.fixture
 def service():
-    """A service of one run at a time for strangers, with one request that may wait."""
+    """A service for untrusted clients, with one run at a time and one waiting request."""
     found = Service(ServiceLimits(agents=100, tasks=50, queue=1, limit_ms=60_000, strangers=True))
     yield found
     found.end()
@@ -81,7 +81,7 @@ def test_answer_has_the_result_of_solve(service):
     ],
 )  # fmt: skip
 def test_bad_requests_are_answered_by_one_line(service, request_, kind, words):
-    """Whatever is wrong with a request is told with its place, and the service goes on."""
+    """Every error in a request is reported with its place, and the service continues."""
     if isinstance(request_, dict):
         request_ = json.dumps(request_)
     answer = service.submit(request_).answer.result(30)
@@ -92,7 +92,7 @@ def test_bad_requests_are_answered_by_one_line(service, request_, kind, words):
 
 
 def test_a_full_queue_turns_requests_away(service):
-    """Beyond one run and one that waits, a request is answered as busy at once; cancelled ones make room."""
+    """Beyond one running and one waiting request, the answer is busy at once; cancelled requests make room."""
     jobs = [service.submit({**LONG, "id": number}) for number in range(3)]
     assert jobs[2].answer.result(0).outcome is Outcome.BUSY
     assert service.open_requests == 2
@@ -104,7 +104,7 @@ def test_a_full_queue_turns_requests_away(service):
 
 
 def test_a_deadline_counts_from_the_arrival(service):
-    """A request that has waited its time away is given its first plan, and not its time anew."""
+    """A request that waited for its whole time limit gets a first plan, without additional time."""
     first, second = (service.submit({**LONG, "limit_ms": 1000}) for _ in range(2))
     runtimes = [job.answer.result(30).document["result"]["runtime_s"] for job in (first, second)]
     assert runtimes[0] > 0.5
@@ -112,7 +112,7 @@ def test_a_deadline_counts_from_the_arrival(service):
 
 
 def test_the_end_gives_open_requests_their_best(service):
-    """A service that ends answers what is open by the best so far, and turns further requests away."""
+    """A service that ends answers open requests with the best so far, and rejects further requests."""
     job = service.submit(LONG)
     time.sleep(0.1)
     service.end()
@@ -122,7 +122,7 @@ def test_the_end_gives_open_requests_their_best(service):
 
 @pytest.mark.parametrize("kind", [ZeroDivisionError, SystemExit])
 def test_defects_are_answers_too(service, monkeypatch, caplog, kind):
-    """An unforeseen exception, an exit too, is answered as failed and logged with its traceback; nothing stays open."""
+    """An unexpected exception or exit is answered as failed and logged with its traceback; no request stays open."""
 
     def fail(*_: object, **__: object) -> None:
         raise kind("by nothing")
@@ -135,7 +135,7 @@ def test_defects_are_answers_too(service, monkeypatch, caplog, kind):
 
 
 def test_loading_a_method_holds_up_no_other(monkeypatch):
-    """While one method is loaded, once for both requests of it, those for a method that is loaded are answered."""
+    """While a method is being loaded, once for two requests, requests for loaded methods are answered."""
     begun, loaded, names = threading.Event(), threading.Event(), []
 
     def slowly(name: str, parameters: dict) -> Allocator:
@@ -162,7 +162,7 @@ def test_loading_a_method_holds_up_no_other(monkeypatch):
 
 
 def test_methods_of_the_operator_have_their_parameters():
-    """A method that is loaded with parameters has them in requests that set none."""
+    """A method loaded with parameters uses them in requests that set none."""
     service = Service(ServiceLimits(), {"ga": {"population": 8}})
     try:
         result = service.submit({"instance": EASY, "method": "ga"}).answer.result(30).document["result"]
@@ -174,7 +174,7 @@ def test_methods_of_the_operator_have_their_parameters():
 
 
 def test_lines_are_answered_as_they_end():
-    """Over lines, requests are told apart by ids: short ones overtake, cancelled ones end, errors have a line."""
+    """Requests in lines are distinguished by ids: short ones overtake, cancelled ones end, errors get an answer."""
     service, written, grown = Service(ServiceLimits(parallel=2)), [], threading.Event()
 
     def write(line: str) -> None:
@@ -201,7 +201,7 @@ def test_lines_are_answered_as_they_end():
 
 
 def test_ids_that_json_lacks_are_answered_over_lines(service):
-    """An id that is no finite number is wrong input, answered without an id; a large whole one comes back exactly."""
+    """An id that is not a finite number is an error, answered without an id; large integers are returned exactly."""
     written = []
     lines = RequestLines(service, lambda line: written.append(json.loads(line)))
     lines.take('{"id": NaN, "cancel": 1}')

@@ -26,7 +26,7 @@ def test_scores_are_those_of_the_evaluator(alloc, small):
 
 
 def test_unserved_tasks_give_exit_code_1(alloc, small):
-    """A task without an agent is no completion time, and exit code 1."""
+    """A task without an agent has no completion time, and the exit code is 1."""
     write({"a1": "t1"})
     ran = alloc("evaluate", "small.json", "answer.json", "--json")
     assert ran.code == 1
@@ -35,7 +35,7 @@ def test_unserved_tasks_give_exit_code_1(alloc, small):
 
 
 def test_violations_give_exit_code_1(alloc, unservable):
-    """An agent where it cannot go is named, with the reason, and does not count."""
+    """An agent that cannot take its task is named with the reason, and does not count."""
     write({"a1": "t1", "a2": "t2"}, "unservable")
     ran = alloc("evaluate", "unservable.json", "answer.json")
     assert ran.code == 1
@@ -45,7 +45,7 @@ def test_violations_give_exit_code_1(alloc, unservable):
 
 @pytest.mark.parametrize("words", ["task", "t2", "workload", "done at", "Bottleneck: task"])
 def test_table_names_tasks(alloc, small, words):
-    """People get a table with a row per task, and what holds the makespan up."""
+    """A table with a row per task and the bottleneck are printed."""
     write({"a1": "t1", "a4": "t2", "a5": "t3"})
     ran = alloc("evaluate", "small.json", "answer.json")
     assert ran.out == ""
@@ -60,7 +60,7 @@ def test_result_from_standard_input(alloc, small):
 
 
 def test_the_bound_of_a_result_is_that_of_its_run(alloc, small):
-    """What `solve` proves is what `evaluate` shows, as JSON and for people: neither contradicts the other."""
+    """Bounds proven by `solve` are shown by `evaluate`, as JSON and as text."""
     solved = alloc("solve", "small.json", "--method", "cpsat", "--objective", "makespan-energy", "--output", "r.json")
     result = json.loads(Path("r.json").read_text())
     shown = alloc("evaluate", "small.json", "r.json", "--json").json
@@ -89,7 +89,7 @@ def test_the_bound_of_a_result_is_that_of_its_run(alloc, small):
     ],
 )
 def test_the_bound_of_another_instance_is_left_out(alloc, small, change, words):
-    """A bound holds for the instance that it was proved on: with other agents or scores there is a note instead."""
+    """A bound holds only for its instance: with other agents or scores there is a note instead."""
     assert alloc("solve", "small.json", "--method", "cpsat", "--output", "r.json").code == 0
     own = {"task_position": small.task_position, "start_task": small.start_task, "battery": small.battery}
     ground = {"name": "small", "ability": small.ability, "workload": small.workload, "energy_per_distance": 6, **own}
@@ -108,7 +108,7 @@ def test_the_bound_of_another_instance_is_left_out(alloc, small, change, words):
 
 @pytest.mark.parametrize("bound", ["high", None, True, 1e9, [], 0])
 def test_bounds_that_cannot_be_are_left_out(alloc, small, bound):
-    """What is no number, or above the makespan that it is to bound, changes nothing; a weaker bound neither."""
+    """Bounds that are not numbers, exceed the makespan, or are weaker, are ignored."""
     assert alloc("solve", "small.json", "--method", "greedy", "--output", "r.json").code == 0
     document = json.loads(Path("r.json").read_text())
     Path("r.json").write_text(json.dumps({**document, "lower_bound": bound}))
@@ -119,7 +119,7 @@ def test_bounds_that_cannot_be_are_left_out(alloc, small, bound):
 
 
 def test_what_a_result_states_wrongly_is_told(alloc, small):
-    """A result whose agents were moved by hand keeps its old scores: what it says, and what is so, are told."""
+    """If agents of a result were moved by hand, the scores in the file and the true ones are reported."""
     assert alloc("solve", "small.json", "--method", "cpsat", "--output", "r.json").code == 0
     document = json.loads(Path("r.json").read_text())
     document["assignment"] |= {"a4": "t1"}
@@ -130,7 +130,7 @@ def test_what_a_result_states_wrongly_is_told(alloc, small):
 
 
 def test_unserved_tasks_that_are_stated_otherwise_are_told(alloc, unservable):
-    """A result that claims to serve every task, though one is unserved, is contradicted too."""
+    """A result that claims to serve every task although one is unserved is contradicted."""
     assert alloc("solve", "unservable.json", "--method", "greedy", "--output", "r.json").code == 1
     assert "note" not in alloc("evaluate", "unservable.json", "r.json").err
     document = json.loads(Path("r.json").read_text())
@@ -140,7 +140,7 @@ def test_unserved_tasks_that_are_stated_otherwise_are_told(alloc, unservable):
 
 
 def test_slack_and_moves_of_a_result_are_shown(alloc, small):
-    """The limit within which energy was bounded, and the moves against a plan in force, are those of `solve`."""
+    """The makespan limit of the energy bound, and the moves from a plan in force, are those of `solve`."""
     assert alloc("solve", "small.json", "--method", "greedy", "--output", "old.json").code == 0
     options = ("--objective", "makespan-energy", "--makespan-slack", "0.5", "--start", "old.json", "--move-price", "1")
     solved = alloc("solve", "small.json", "--method", "milp", *options, "--output", "r.json")

@@ -5,7 +5,7 @@ import pytest
 
 
 def test_the_solution_of_an_exported_model_is_evaluated(alloc, small):
-    """From the instance to a model, by another solver to a solution, and by `evaluate` to the optimal scores."""
+    """An instance is exported, solved by another solver, and its solution evaluated to the optimal scores."""
     assert alloc("export", "small.json", "--output", "small.lp") == type(alloc("--version"))(0, "", "")
     highs = highspy.Highs()
     highs.setOptionValue("output_flag", False)
@@ -23,7 +23,7 @@ def test_the_command_has_two_names(alloc, small):
 
 
 def test_standard_output_needs_a_format(alloc, small):
-    """A model goes to standard output in the format that is named; without one, an error names the option."""
+    """A model is written to standard output in the given format; without one, an error names the option."""
     ran = alloc("export", "small.json", "--output", "-", "--format", "mps", "--model", "plain")
     assert (ran.code, ran.err) == (0, "")
     assert ran.out.startswith("* ")
@@ -34,7 +34,7 @@ def test_standard_output_needs_a_format(alloc, small):
 
 
 def test_energy_needs_a_makespan(alloc, small):
-    """The energy is minimised at a makespan alone; the error names the option, and no file is left behind."""
+    """Minimising energy requires a makespan; the error names the option, and no file is left."""
     ran = alloc("export", "small.json", "--objective", "makespan-energy", "--output", "m.lp")
     assert (ran.code, ran.out) == (2, "")
     assert ran.err.startswith("alloc: --makespan: is needed")

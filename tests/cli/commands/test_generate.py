@@ -32,7 +32,7 @@ def test_every_parameter_of_the_family_is_an_option(alloc):
 
 
 def test_machine_covering_is_the_generator_s(alloc):
-    """Families of the published table have a name, and options of their own."""
+    """Families of the published table have a name and their own options."""
     assert alloc("generate", "covering", "--seed", "7", "--output", "c.json").code == 0
     assert to_document(read_instance("c.json")) == to_document(machine_covering(100, 25, 1, 1000, 7))
     options = ("--agents", "9", "--tasks", "4", "--ability-min", "20", "--ability-max", "50", "--workload", "uniform")
@@ -55,27 +55,27 @@ def test_machine_covering_is_the_generator_s(alloc):
     ],
 )
 def test_machine_covering_refuses(alloc, option, value, told):
-    """What these families do not have is told under the name of the option."""
+    """Options that do not apply to these families are errors that name them."""
     ran = alloc("generate", "covering", option, value)
     assert (ran.code, ran.out) == (2, "")
     assert told in ran.err
 
 
 def test_count_gives_a_file_per_seed(alloc):
-    """--count writes one file for each seed from the first on."""
+    """--count writes one file per seed, starting with the given one."""
     assert alloc("generate", "paper-1", "--seed", "3", "--count", "2", "--output", "new/many").code == 0
     files = sorted(Path("new/many").iterdir())
     assert [read_instance(file).name for file in files] == ["paper-1-seed-3", "paper-1-seed-4"]
 
 
 def test_standard_output_is_json_alone(alloc):
-    """Without --output the instance goes to standard output, ready for a pipe."""
+    """Without --output the instance is written to standard output."""
     ran = alloc("generate", "random", "--agents", "3", "--tasks", "2")
     assert ran.err == ""
     assert ran.json["format"] == "alloc-instance/1"
 
 
 def test_errors_name_the_option(alloc):
-    """A value that the family refuses is told under the name of its option."""
+    """An error for an invalid value names its option."""
     assert alloc("generate", "random", "--ability-min", "-1").err.startswith("alloc: --ability-min: must be")
     assert alloc("generate", "random", "--range", "5:1").err.startswith("alloc: --range: must not")

@@ -23,7 +23,7 @@ def run(alloc, *options):
 
 @pytest.mark.usefixtures("tables")
 def test_it_says_what_it_guessed(alloc):
-    """Each column has a line on standard error, and what is left out another; the instance can be solved."""
+    """Each column, and each omission, has a line on standard error; the instance can be solved."""
     ran = run(alloc, "--output", "fleet.json")
     assert (ran.code, ran.out) == (0, "")
     assert ran.err.splitlines() == [
@@ -42,7 +42,7 @@ def test_it_says_what_it_guessed(alloc):
 
 @pytest.mark.usefixtures("tables")
 def test_a_table_alone_leads_to_this_command(alloc):
-    """Whoever has a table and solves it at once is told what makes an instance of two."""
+    """Solving a single table gives an error that refers to `alloc import`."""
     ran = alloc("solve", "tasks.csv")
     assert (ran.code, len(ran.err.splitlines())) == (2, 1)
     assert "combine two tables with `alloc import`" in ran.err
@@ -50,14 +50,14 @@ def test_a_table_alone_leads_to_this_command(alloc):
 
 @pytest.mark.usefixtures("tables")
 def test_it_goes_to_standard_output(alloc):
-    """`-` gives JSON and nothing else; `--quiet` says nothing."""
+    """`-` writes only JSON; `--quiet` prints nothing."""
     ran = run(alloc, "--output", "-", "--quiet")
     assert (ran.code, ran.err, ran.json["name"]) == (0, "", "agents")
 
 
 @pytest.mark.usefixtures("tables")
 def test_columns_are_named_by_the_user(alloc):
-    """`--map` takes several fields, texts with commas and blanks, and numbers for all rows."""
+    """`--map` accepts several fields, texts with commas and blanks, and numbers for all rows."""
     Path("tasks.csv").write_text('"Job, no",Length of work\ns1,3\ns2,5\n')
     ran = run(alloc, "--map", "tasks.id=Job, no,workload=Length of work,ability=2", "--output", "fleet.json")
     assert ran.code == 0, ran.err
@@ -80,7 +80,7 @@ def test_columns_are_named_by_the_user(alloc):
     ],
 )
 def test_bad_options_are_one_line(alloc, options, line):
-    """What cannot be is one line with the option or the file, exit code 2, and nothing is written."""
+    """Invalid options give one line with the option or the file and exit code 2, and nothing is written."""
     ran = run(alloc, *options, "--output", "fleet.json")
     assert (ran.code, ran.out) == (2, "")
     assert ran.err.startswith(line)
@@ -90,7 +90,7 @@ def test_bad_options_are_one_line(alloc, options, line):
 
 @pytest.mark.usefixtures("tables")
 def test_tables_are_not_overwritten(alloc):
-    """The output is none of the tables."""
+    """The output must not be one of the tables."""
     ran = run(alloc, "--output", "agents.csv")
     assert ran.code == 2
     assert Path("agents.csv").read_text() == AGENTS
@@ -98,7 +98,7 @@ def test_tables_are_not_overwritten(alloc):
 
 @pytest.mark.usefixtures("tables")
 def test_other_formats_say_what_to_save(alloc):
-    """A spreadsheet of another program is refused with the formats that are read."""
+    """Unsupported spreadsheet formats are refused with the supported ones."""
     Path("fleet.ods").write_bytes(b"PK")
     ran = alloc("import", "--agents", "fleet.ods", "--tasks", "tasks.csv", "--output", "fleet.json")
     assert (ran.code, ran.err) == (2, "alloc: fleet.ods: tables cannot be read from .ods; save it as .xlsx or .csv\n")
@@ -106,7 +106,7 @@ def test_other_formats_say_what_to_save(alloc):
 
 @pytest.mark.usefixtures("tables")
 def test_openpyxl_is_asked_for(alloc, monkeypatch):
-    """Without openpyxl, a workbook is refused with the line that installs it."""
+    """Without openpyxl, a workbook is refused with the command that installs it."""
     monkeypatch.setitem(__import__("sys").modules, "openpyxl", None)
     Path("fleet.xlsx").write_bytes(b"PK")
     ran = alloc("import", "--agents", "fleet.xlsx:Drones", "--tasks", "tasks.csv", "--output", "fleet.json")

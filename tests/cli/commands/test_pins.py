@@ -1,4 +1,4 @@
-"""--pin and --pin-file: ids with =, contradictions, and files of another state of affairs."""
+"""--pin and --pin-file: ids with =, contradictions, and files for changed instances."""
 
 import json
 from pathlib import Path
@@ -39,7 +39,7 @@ def signs(tmp_path):
     ],
 )
 def test_an_id_may_contain_the_sign(alloc, signs, pair, pins):
-    """The text is split where both sides are ids of the instance."""
+    """The text is split such that both sides are ids of the instance."""
     ran = alloc("solve", "signs.json", "--method", "greedy", "--json", "--pin", pair)
     assert ran.json["pins"] == pins
 
@@ -55,21 +55,21 @@ def test_an_id_may_contain_the_sign(alloc, signs, pair, pins):
     ],
 )
 def test_what_cannot_be_meant_is_refused(alloc, signs, pair, message):
-    """Two possible readings, and none, are one line; an unknown task is told for the longest agent that is known."""
+    """Ambiguous and invalid pins are one line; an unknown task is reported for the longest known agent id."""
     ran = alloc("solve", "signs.json", "--pin", pair)
     assert (ran.code, ran.out, ran.err.count("\n")) == (2, "", 1)
     assert ran.err.startswith(f"alloc: --pin: {message}")
 
 
 def test_what_is_ambiguous_on_the_command_line_can_be_pinned_by_a_file(alloc, signs):
-    """The way out that the message names works."""
+    """The alternative suggested by the message works."""
     write({"D=2": "task"})
     assert pins_of(alloc, "--pin-file", "pins.json", instance="signs.json") == {"D=2": "task"}
 
 
 @pytest.mark.parametrize("file", [(), ("--pin-file", "pins.json")])
 def test_an_agent_pinned_twice_is_refused(alloc, small, file):
-    """Two options that contradict each other are refused, with a file and without; the same twice is not."""
+    """Contradicting options are refused, with and without a file; repetitions are accepted."""
     write({"a2": "t1"})
     message = pins_of(alloc, *file, "--pin", "a1=t1", "--pin", "a1=t2")
     assert message == "alloc: --pin: 'a1' is pinned to task 't1' and to task 't2'\n"
@@ -79,13 +79,13 @@ def test_an_agent_pinned_twice_is_refused(alloc, small, file):
 
 
 def test_an_option_counts_more_than_the_file(alloc, small):
-    """--pin says otherwise than the file for one agent, and the file holds for the others."""
+    """--pin overrides the file for one agent, and the file applies to the others."""
     write({"a1": "t1", "a2": "t2"})
     assert pins_of(alloc, "--pin-file", "pins.json", "--pin", "a1=t3") == {"a1": "t3", "a2": "t2"}
 
 
 def test_pins_of_what_has_gone_are_left_out(alloc, small):
-    """As with --start, agents and tasks that have gone are left out, and a note of the file says so."""
+    """As with --start, agents and tasks that no longer exist are dropped, with a note."""
     write({"a1": "t1", "a2": "t9", "a9": "t2"})
     ran = alloc("solve", "small.json", "--method", "greedy", "--json", "--pin-file", "pins.json")
     assert ran.json["pins"] == {"a1": "t1"}
@@ -101,7 +101,7 @@ def test_pins_of_what_has_gone_are_left_out(alloc, small):
     ],
 )
 def test_errors_of_the_file_name_it(alloc, unservable, assignment, message):
-    """What is wrong in a file of pins is told with the file, and the agent."""
+    """Errors in a file of pins name the file and the agent."""
     write(assignment)
     ran = alloc("solve", "unservable.json", "--pin-file", "pins.json")
     assert (ran.code, ran.err) == (2, f"alloc: {message}\n")

@@ -61,7 +61,7 @@ def orders(answer: dict) -> dict:
 
 
 def test_each_line_is_answered_by_one(alloc, pair):
-    """Plans after events and requests, none where none is asked for; changes with their causes."""
+    """Plans are returned after events and requests, unless not requested; changes have causes."""
     ran = alloc("plan", "pair.json", "--stdio", "--policy", "nearest", stdin=lines(*REQUESTS))
     assert ran.code == 0
     found = answers(ran.out)
@@ -78,7 +78,7 @@ def test_each_line_is_answered_by_one(alloc, pair):
 
 
 def test_errors_are_lines_and_lose_nothing(alloc, pair):
-    """What is wrong with a line is its answer, whatever the line is; the plan stays as it was."""
+    """An invalid line is answered by an error, and does not change the plan."""
     wrong = (
         ("", "is empty"),
         ("{", "is not JSON"),
@@ -101,7 +101,7 @@ def test_errors_are_lines_and_lose_nothing(alloc, pair):
 
 
 def test_the_first_line_may_be_the_mission(alloc, pair):
-    """Without MISSION the first line that is one begins; it is answered by the first plan."""
+    """Without MISSION, the first line that is a mission is used, and answered by the first plan."""
     text = lines("nonsense", to_document(pair), {"event": "agent-fails", "agent": "ann"})
     found = answers(alloc("plan", "--stdio", "--policy", "nearest", stdin=text).out)
     assert "error" in found[0]
@@ -109,7 +109,7 @@ def test_the_first_line_may_be_the_mission(alloc, pair):
 
 
 def test_it_goes_on_from_its_state(alloc, pair):
-    """What was saved at the end of the input is where the next run begins; it is then no place for a mission."""
+    """The next run resumes from the state saved at the end of the input; MISSION is then an error."""
     arguments = ("plan", "--stdio", "--policy", "nearest", "--state", "state.json")
     first = alloc(*arguments, "pair.json", stdin=lines({"event": "agent-fails", "agent": "ann", "hour": 1}))
     again = alloc(*arguments, stdin=lines({"request": "plan"}))
@@ -120,7 +120,7 @@ def test_it_goes_on_from_its_state(alloc, pair):
 
 
 def test_wrong_arguments_are_told_before_any_line(alloc, pair):
-    """A policy or a file that there is not is one line and exit code 2."""
+    """An unknown policy or file gives one line and exit code 2."""
     for arguments, told in (
         (("pair.json",), "--stdio: is needed"),
         (("pair.json", "--stdio", "--state", "absent/state.json"), "there is no folder 'absent'; create it first"),
@@ -137,7 +137,7 @@ def test_wrong_arguments_are_told_before_any_line(alloc, pair):
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")
 def test_sigterm_is_a_clean_end(pair, tmp_path):
-    """What came before it is answered and saved, and the exit code is 0, though the input is still open."""
+    """Earlier lines are answered and saved, and the exit code is 0, although the input is still open."""
     command = [*COMMAND, str(tmp_path / "pair.json"), "--state", str(tmp_path / "state.json")]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdin is not None
@@ -154,7 +154,7 @@ def test_sigterm_is_a_clean_end(pair, tmp_path):
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")
 def test_killed_after_it_saved_it_goes_on(alloc, pair, tmp_path):
-    """What was saved by a request is there after SIGKILL; the next run has the same plan."""
+    """A state saved by request survives SIGKILL; the next run has the same plan."""
     command = [*COMMAND, str(tmp_path / "pair.json"), "--state", str(tmp_path / "state.json")]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdin is not None
@@ -197,7 +197,7 @@ send({request: "plan"});
 
 @pytest.mark.skipif(shutil.which("node") is None, reason="needs node")
 def test_a_program_of_node_can_use_it(pair, tmp_path):
-    """It asks, waits for the answer, asks again, gets an error for a wrong id, and ends it by closing its input."""
+    """It sends requests and waits for answers, gets an error for a wrong id, and ends `alloc` by closing its input."""
     command = ["node", "-e", NODE, *COMMAND, str(tmp_path / "pair.json")]
     done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True)
     assert done.stdout.splitlines() == ["ann t1, ben t2", "error", "ann t1"]

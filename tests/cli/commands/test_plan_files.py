@@ -1,4 +1,4 @@
-"""Every command that takes a plan reads every file that holds one."""
+"""Every command that takes a plan reads every format of plans."""
 
 import csv
 import json
@@ -19,7 +19,7 @@ def solution(instance: Instance, head: str, line: str) -> str:
 
 
 def by_highs(instance: Instance, style: int) -> str:
-    """Return the solution that HiGHS writes where it is left no choice but the plan."""
+    """Return the solution file of HiGHS with all variables fixed to the plan."""
     write_model(instance, "plain.lp", model="plain", makespan=1e3)
     highs = highspy.Highs()
     highs.setOptionValue("output_flag", False)
@@ -33,7 +33,7 @@ def by_highs(instance: Instance, style: int) -> str:
 
 
 def as_table(instance: Instance) -> str:
-    """Return a table with columns in another order, and one that is of no use."""
+    """Return a table with columns in another order, and an additional one."""
     return "\n".join(["note,task,agent", *(f"-,{task},{agent}" for agent, task in PLAN.items())])
 
 
@@ -57,7 +57,7 @@ FILES: dict[str, Callable[[Instance], str]] = {
 
 @pytest.mark.parametrize("name", FILES)
 def test_every_command_reads_every_plan(alloc, small, name):
-    """evaluate, plot, --start, --pin-file and the start of a front take tables and solutions as they take JSON."""
+    """evaluate, plot, --start, --pin-file and the start of a front accept tables and solutions like JSON."""
     text = FILES[name](small)
     Path(name).write_text(text)
     assert read_allocation(name, small)[0] == Allocation.from_ids(small, PLAN)
@@ -73,7 +73,7 @@ def test_every_command_reads_every_plan(alloc, small, name):
 
 
 def test_a_table_that_solve_wrote_is_a_plan(alloc, small):
-    """The .csv of --output goes back in, idle agents included."""
+    """The .csv of --output can be read back, including idle agents."""
     assert alloc("solve", "small.json", "--method", "greedy", "-q", "--output", "p.csv", "--pin", "a3=").code == 0
     with open("p.csv", newline="") as file:
         rows = {row["agent"]: row["task"] or None for row in csv.DictReader(file)}
@@ -94,7 +94,7 @@ def test_a_table_that_solve_wrote_is_a_plan(alloc, small):
     ],
 )
 def test_a_broken_table_is_one_line(alloc, small, text, message):
-    """What is wrong in a table is told with file, line and column, with exit code 2."""
+    """Errors in a table name file, line and column, with exit code 2."""
     Path("p.csv").write_text(text)
     for command in (("evaluate", "small.json", "p.csv"), ("plot", "small.json", "p.csv", "--output", "p.png")):
         ran = alloc(*command)
@@ -103,7 +103,7 @@ def test_a_broken_table_is_one_line(alloc, small, text, message):
 
 
 def test_a_result_without_a_plan_is_still_drawn(alloc, small):
-    """A result that found nothing is a picture that says so, and no plan for other commands."""
+    """A result without an allocation is drawn as a message, and is not a plan for other commands."""
     result = alloc("solve", "small.json", "--method", "greedy", "--json").json
     result |= dict.fromkeys(("makespan", "served_makespan", "energy", "distance", "reward", "lower_bound", "gap"))
     result |= {"status": "no_solution", "assignment": {}, "battery_remaining_percent": None, "trace": []}

@@ -17,14 +17,14 @@ def test_a_schema_is_printed_as_json(alloc, name):
 
 
 def test_formats_are_listed(alloc):
-    """Without a name, all formats that have a schema are listed to standard error."""
+    """Without a name, all formats with a schema are listed on standard error."""
     ran = alloc("schema")
     assert (ran.code, ran.out) == (0, "")
     assert all(name in ran.err for name in SCHEMAS)
 
 
 def test_unknown_formats_are_errors(alloc):
-    """A name that no format has is one line with the nearest one, and exit code 2."""
+    """An unknown name gives one line with the most similar one, and exit code 2."""
     ran = alloc("schema", "alloc-instanze/1")
     assert (ran.code, ran.out) == (2, "")
     assert ran.err == "alloc: NAME: there is no format 'alloc-instanze/1' (did you mean 'alloc-instance/1'?)\n"

@@ -1,4 +1,4 @@
-"""``alloc serve``: what cannot be served is one line, with the option that says so."""
+"""``alloc serve``: errors are one line that names the option."""
 
 import socket
 import subprocess
@@ -9,7 +9,7 @@ import pytest
 
 
 def test_a_port_that_is_taken_is_one_line(alloc):
-    """The line has the reason that the operating system gives, and nothing stays changed in the process."""
+    """The line has the reason of the operating system, and the state of the process is restored."""
     before = sys.getswitchinterval()
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
@@ -29,7 +29,7 @@ def test_a_port_that_is_taken_is_one_line(alloc):
     ],
 )
 def test_methods_that_cannot_be_loaded_are_one_line(alloc, load, begin):
-    """It names the option, and the parameter of the method or the file where it is one of those that are wrong."""
+    """It names the option, and the parameter of the method or the file if that is invalid."""
     ran = alloc("serve", "--stdio", "--load", load)
     assert (ran.code, ran.out, ran.err.count("\n")) == (2, "", 1)
     assert ran.err.startswith(f"alloc: {begin}")

@@ -21,7 +21,7 @@ FIELDS = [
 
 
 def test_json_is_the_result_format_and_all_there_is_on_stdout(alloc, small):
-    """Standard output holds the fields of alloc-result/1, and they are what the evaluator says."""
+    """Standard output has the fields of alloc-result/1, which agree with the evaluator."""
     ran = alloc("solve", "small.json", "--method", "greedy", "--seed", "3", "--json")
     result = ran.json
     assert (ran.code, ran.err) == (0, "")
@@ -31,7 +31,7 @@ def test_json_is_the_result_format_and_all_there_is_on_stdout(alloc, small):
 
 
 def test_summary_goes_to_stderr(alloc, small):
-    """Without --json the summary stands on standard error: status, figures, the last task and what would help."""
+    """Without --json the summary is on standard error: status, scores and the bottleneck."""
     ran = alloc("solve", "small.json", "--method", "greedy")
     assert (ran.code, ran.out) == (0, "")
     for words in (
@@ -46,20 +46,20 @@ def test_summary_goes_to_stderr(alloc, small):
 
 
 def test_quiet_says_nothing(alloc, small):
-    """With --quiet a run that goes well prints nothing at all."""
+    """With --quiet a successful run prints nothing."""
     ran = alloc("solve", "small.json", "--quiet", "--method", "greedy")
     assert (ran.code, ran.out, ran.err) == (0, "", "")
 
 
 def test_auto_says_what_it_picked(alloc, small):
-    """The notes of the result, such as auto's choice, come on standard error."""
+    """The notes of the result, such as auto's choice, are printed on standard error."""
     ran = alloc("solve", "small.json", "--json")
     assert "note: auto picked" in ran.err
     assert ran.json["status"] == "optimal"
 
 
 def test_unserved_tasks_give_exit_code_1(alloc, unservable):
-    """A task that nobody can take gives exit code 1, the best partial plan, and the reason."""
+    """A task that no agent can take gives exit code 1, the best partial plan, and the reason."""
     ran = alloc("solve", "unservable.json", "--method", "greedy", "--json")
     assert ran.code == 1
     assert ran.json["unserved_tasks"] == ["t2"]
@@ -69,7 +69,7 @@ def test_unserved_tasks_give_exit_code_1(alloc, unservable):
 
 
 def test_output_start_and_standard_streams(alloc, small):
-    """A result written with --output starts another run, which is never worse; `-` reads and writes streams."""
+    """A result of --output can start another run, which is never worse; `-` reads and writes standard streams."""
     assert alloc("solve", "small.json", "--method", "cpsat", "--output", "best.json", "-q").code == 0
     best = json.loads(Path("best.json").read_text())
     ran = alloc("solve", "small.json", "--method", "greedy", "--start", "best.json", "--output", "-")
@@ -79,14 +79,14 @@ def test_output_start_and_standard_streams(alloc, small):
 
 
 def test_iterations_alone_are_reproducible(alloc, small):
-    """With --iterations the same seed gives the same answer, and no time limit interferes."""
+    """With --iterations alone, the same seed gives the same result."""
     runs = [alloc("solve", "small.json", "--method", "ga", "--iterations", "5", "--json").json for _ in range(2)]
     assert runs[0]["assignment"] == runs[1]["assignment"]
     assert runs[0]["stop_reason"] != "time_limit"
 
 
 def test_what_has_changed_since_the_start_was_made_is_a_note(alloc, small):
-    """A plan for another state of affairs is used as far as it goes, with a note of what has changed."""
+    """A plan for a changed instance is used as far as possible, with a note on the changes."""
     Path("other.json").write_text(
         json.dumps({"format": "alloc-allocation/1", "instance": "other", "assignment": {"a1": "t1"}})
     )
@@ -96,7 +96,7 @@ def test_what_has_changed_since_the_start_was_made_is_a_note(alloc, small):
 
 
 def test_saturated_reward_is_a_note(alloc):
-    """A reward beyond the range of floats is told where the answer shows it: in JSON, not in a summary."""
+    """A reward beyond the range of floats gives a note with JSON, not with a summary."""
     document = {
         "format": "alloc-instance/1",
         "agents": [{"id": "a", "ability": 1}],
@@ -115,14 +115,14 @@ def test_saturated_reward_is_a_note(alloc):
 
 
 def test_the_picture_is_that_of_the_answer(alloc, small):
-    """--plot draws the plan that is answered with, to the last pixel."""
+    """--plot draws exactly the plan of the result."""
     assert alloc("solve", "small.json", "--method", "greedy", "--plot", "picture.png", "-q").code == 0
     plot(solve(small, "greedy", handle_signals=False), "expected.png")
     assert compare_images("expected.png", "picture.png", 0) is None
 
 
 def test_a_drawing_in_svg_names_all(alloc, small):
-    """--plot writes .svg too: a bar and a name for each task, and what is answered in the title."""
+    """--plot also writes .svg, with a bar and a name for each task, and the scores in the title."""
     assert alloc("solve", "small.json", "--method", "greedy", "--plot", "picture.svg", "-q").code == 0
     content = Path("picture.svg").read_text("utf-8")
     assert ElementTree.fromstring(content).tag == "{http://www.w3.org/2000/svg}svg"
@@ -133,7 +133,7 @@ def test_a_drawing_in_svg_names_all(alloc, small):
 
 
 def test_the_saved_result_is_that_of_stdout(alloc, small):
-    """--output and --json give the same document, and the instance is left alone."""
+    """--output and --json give the same document, and the instance file is not changed."""
     ran = alloc("solve", "small.json", "--method", "greedy", "--output", "result.json", "--json")
     assert json.loads(Path("result.json").read_text()) == ran.json
     assert read_instance("small.json").name == "small"
@@ -141,20 +141,20 @@ def test_the_saved_result_is_that_of_stdout(alloc, small):
 
 @pytest.mark.parametrize("option", ["--output", "--plot"])
 def test_an_empty_name_is_no_file(alloc, small, option):
-    """A variable of the shell that is empty does not mean the working folder."""
+    """An empty name, as from an unset shell variable, is not the working folder."""
     ran = alloc("solve", "small.json", option, "")
     assert (ran.code, ran.out, ran.err.count("\n")) == (2, "", 1)
 
 
 def test_closed_standard_output_is_told(alloc, small, monkeypatch):
-    """JSON that has nowhere to go is an error, not silence; a file asked for is written all the same."""
+    """A closed standard output is an error with --json; a requested file is still written."""
     monkeypatch.setattr("sys.stdout", None)
     assert main(["solve", "small.json", "--method", "greedy", "-q", "--json", "--output", "best.json"]) == 2
     assert json.loads(Path("best.json").read_text())["instance"] == "small"
 
 
 def test_slack_buys_energy(alloc, small):
-    """With slack the answer is slower, within the limit that the result names, and takes less energy."""
+    """With slack the result has a longer makespan, within the limit, and less energy."""
     strict = alloc("solve", "small.json", "--objective", "makespan-energy", "--json").json
     loose = alloc("solve", "small.json", "--objective", "makespan-energy", "--makespan-slack", "1", "--json")
     assert "makespan_limit" not in strict
@@ -179,7 +179,7 @@ def test_slack_buys_energy(alloc, small):
     ],
 )
 def test_wrong_slack_is_refused(alloc, small, arguments, words):
-    """Slack without energy, slack that is no number, and a method that has no use for it: one line, exit code 2."""
+    """Slack without energy, invalid slack, and a method without support for it give one line and exit code 2."""
     ran = alloc("solve", "small.json", *arguments)
     assert (ran.code, ran.out) == (2, "")
     assert words in ran.err

@@ -1,4 +1,4 @@
-"""``alloc train``: mistakes are told beforehand, interrupts lose nothing, and kill -9 changes no curve."""
+"""``alloc train``: mistakes are reported before training, and interrupts and kill -9 do not change results."""
 
 import csv
 import inspect
@@ -34,7 +34,7 @@ QUICK = ("--instances", "mine", "--generation-steps", "150", "--set", "update_ep
 
 @pytest.fixture
 def mine(tmp_path: Path) -> Path:
-    """A folder with instances on which a generation takes no time."""
+    """A folder with instances on which a generation is fast."""
     folder = tmp_path / "mine"
     folder.mkdir()
     for seed in range(2):
@@ -43,7 +43,7 @@ def mine(tmp_path: Path) -> Path:
 
 
 def curve(path: Path) -> list[list[str]]:
-    """All figures but those of time."""
+    """All columns of the log except times."""
     with path.open(newline="") as file:
         return [row[:-2] for row in csv.reader(file)]
 
@@ -78,21 +78,21 @@ def weights(path: Path) -> dict[str, torch.Tensor]:
     ],
 )
 def test_bad_usage_is_told_before_training(alloc, more):
-    """Whatever cannot work is told at once, in one line."""
+    """Invalid options are reported at once, in one line."""
     ran = alloc("train", "gappo", "--output", "p.safetensors", *more)
     assert (ran.code, ran.out, ran.err.count("\n")) == (2, "", 1)
     assert not Path("p.safetensors").exists()
 
 
 def test_methods_that_cannot_be_trained_so(alloc):
-    """Unknown methods are told, and that a single network is no population."""
+    """Unknown methods, and populations for methods with a single network, are errors."""
     assert "did you mean 'gappo'" in alloc("train", "gapo", "--output", "p.safetensors").err
     ran = alloc("train", "ppo", "--output", "p.safetensors", "--population", "3")
     assert (ran.code, ran.err.count("\n")) == (2, 1)
 
 
 def test_tensorboard_that_is_not_installed_is_told_before_training(alloc, monkeypatch):
-    """The extra to install is named."""
+    """The error names the extra to install."""
     monkeypatch.setitem(sys.modules, "torch.utils.tensorboard", None)
     ran = alloc("train", "ppo", "--output", "p.safetensors", "--tensorboard", "events")
     assert (ran.code, ran.out, ran.err.count("\n")) == (2, "", 1)
@@ -101,7 +101,7 @@ def test_tensorboard_that_is_not_installed_is_told_before_training(alloc, monkey
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_interrupted_before_the_first_generation_writes_no_policy(alloc, monkeypatch, mine, number):
-    """A signal ends a training in the middle of a generation; without a whole generation there is no policy."""
+    """A signal ends training within a generation; without a complete generation there is no policy."""
 
     def train_on(self, job):
         os.kill(os.getpid(), number)
@@ -118,7 +118,7 @@ def test_interrupted_before_the_first_generation_writes_no_policy(alloc, monkeyp
 
 
 def test_an_engine_that_gives_up_is_told_in_one_line(alloc, monkeypatch, mine):
-    """Too little memory is no defect of the program; the line says what is kept, and how to go on."""
+    """Lack of memory is not a defect of the program; the line says what is kept, and how to resume."""
 
     def give_up(*_):
         raise EngineError("a worker process died 3 times at the same item")
@@ -132,7 +132,7 @@ def test_an_engine_that_gives_up_is_told_in_one_line(alloc, monkeypatch, mine):
 
 
 def test_a_run_is_not_overwritten_by_mistake(alloc, mine):
-    """Where a checkpoint stands already, a new training has to be told to go on, or to go elsewhere."""
+    """If a checkpoint exists, a new training must be resumed or written elsewhere."""
     assert alloc("train", "ppo", "--output", "p.safetensors", *QUICK, "--iterations", "1").code == 0
     before = files()
     ran = alloc("train", "ppo", "--output", "p.safetensors", *QUICK)
@@ -144,7 +144,7 @@ def test_a_run_is_not_overwritten_by_mistake(alloc, mine):
 
 
 def test_a_run_without_a_generation_blocks_none(alloc, mine):
-    """What a run leaves behind that failed or ended at once may be resumed, and need not be removed."""
+    """Files of a run without a complete generation do not block another run."""
     assert alloc("train", "gappo", "--output", "p", *QUICK, "--iterations", "0").code == 1
     assert Path("p.checkpoint").exists()
     ran = alloc("train", "gappo", "--output", "p", *QUICK, "--iterations", "1", "--population", "2", "--resume")
@@ -168,7 +168,7 @@ def test_a_run_without_a_generation_blocks_none(alloc, mine):
     ],
 )
 def test_what_is_wrong_in_any_case_comes_first(alloc, more, message):
-    """Whoever mistypes an option is told of that, not of a checkpoint that is beside the point."""
+    """Errors in options are reported before errors about checkpoints."""
     Path("p.checkpoint").write_bytes(b"weeks of training")
     ran = alloc("train", *more, "--output", "p.safetensors")
     assert (ran.code, ran.out, ran.err.count("\n")) == (2, "", 1)
@@ -193,7 +193,7 @@ def test_what_is_wrong_in_any_case_comes_first(alloc, more, message):
     ],
 )
 def test_what_training_did_not_write_is_not_replaced(alloc, small, more, message):
-    """Instances, tensors from elsewhere, policies and tables are safe from a mistyped name."""
+    """Instances, foreign tensors, policies and tables are not overwritten."""
     save_file({"a": torch.zeros(2)}, "tensors")
     save_policy("policy", [ActorCritic(NetworkSize(4, 4, 1))], "ppo")
     before = files()
@@ -204,14 +204,14 @@ def test_what_training_did_not_write_is_not_replaced(alloc, small, more, message
 
 
 def test_empty_files_hold_nothing(alloc, mine):
-    """A temporary file, made beforehand, is a place to write to."""
+    """An empty file, such as a temporary one, can be overwritten."""
     for name in ("p", "p.checkpoint", "p.csv"):
         Path(name).touch()
     assert alloc("train", "ppo", "--output", "p", *QUICK, "--iterations", "1").code == 0
 
 
 def test_mistakes_are_told_before_torch_is_loaded(small, tmp_path):
-    """Nobody waits seconds to be told of a typing error: the process that is told of all of them has no torch yet."""
+    """Errors in options are reported without loading torch."""
     mistakes = [
         "gapo",
         "gappo --family mixt",
@@ -234,7 +234,7 @@ def test_mistakes_are_told_before_torch_is_loaded(small, tmp_path):
 
 
 def test_resumed_by_another_command_it_goes_on_to_the_same_curve(alloc, mine):
-    """Two generations, and then two more, are four; progress and the outcome are told."""
+    """Two generations, and then two more, equal four; progress and outcome are printed."""
     whole = alloc("train", "gappo", "--output", "w", *QUICK, "--steps", "1500", "--population", "2")
     assert whole.code == 0
     assert "T 1." in whole.err
@@ -256,7 +256,7 @@ def test_resumed_by_another_command_it_goes_on_to_the_same_curve(alloc, mine):
 
 @pytest.mark.slow
 def test_killed_at_any_moment_it_resumes_to_the_same_curve(alloc, mine):
-    """kill -9 in mid-training, again and again, leaves whole files, and changes neither log nor policy."""
+    """Repeated kill -9 during training leaves complete files, and does not change log or policy."""
     options = [*QUICK, "--steps", "3000", "--population", "2"]
     assert alloc("train", "gappo", "--output", "w", *options).code == 0
     command = [sys.executable, "-c", "from alloc.cli.main import main; raise SystemExit(main())"]
@@ -288,7 +288,7 @@ def _is_newer(name: str, moment: int) -> bool:
 
 
 def test_a_policy_is_a_beginning(alloc, mine):
-    """--init starts from the networks of a policy, whatever method trained it; the file tells how it came about."""
+    """--init starts from the networks of a policy of any method; the file records its origin."""
     assert alloc("train", "ppo", "--output", "p", *QUICK, "--steps", "300", "--seed", "3").code == 0
     ran = alloc("train", "gappo", "--output", "g", *QUICK, "--init", "p", "--iterations", "0", "--checkpoint", "c")
     assert ran.code == 1
@@ -306,7 +306,7 @@ def test_a_policy_is_a_beginning(alloc, mine):
 
 
 def test_what_judges_the_networks_is_named(alloc, mine):
-    """Some of one's own instances are held out, and named; those with nothing to do count for nothing."""
+    """Some of the given instances are held out, and named; those without work are left out."""
     ran = alloc("train", "ppo", "--output", "p", *QUICK, "--iterations", "1")
     assert "note: the networks are judged on the instances that they learn from" in ran.err
     for seed in range(2, 6):
@@ -319,7 +319,7 @@ def test_what_judges_the_networks_is_named(alloc, mine):
 
 
 def test_the_game_of_the_paper_can_be_trained_on(alloc, mine):
-    """All agents choosing at once for coverage is a training, too."""
+    """Training with simultaneous choices and the coverage reward works."""
     ran = alloc(
         "train", "ppo", "--output", "p", *QUICK, "--iterations", "1", "--turn", "simultaneous", "--reward", "coverage"
     )
@@ -327,7 +327,7 @@ def test_the_game_of_the_paper_can_be_trained_on(alloc, mine):
 
 
 def test_options_are_those_of_the_library():
-    """The command line, which must not wait for torch, names the same engines and families."""
+    """The command line, which does not load torch, has the same engines and families."""
     assert {engine.value for engine in train_options.Engine} == set(ENGINES)
     for name in FAMILIES:
         assert name in inspect.getsource(train_options)
@@ -335,7 +335,7 @@ def test_options_are_those_of_the_library():
 
 @pytest.mark.needs("tensorboard")
 def test_a_resumed_run_keeps_its_events(alloc, mine):
-    """TensorBoard shows the generations before --resume beside those after it, each once."""
+    """TensorBoard shows the generations before and after --resume, each once."""
     from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
     run = ("train", "ppo", "--output", "p.safetensors", *QUICK, "--tensorboard", "events")
@@ -348,7 +348,7 @@ def test_a_resumed_run_keeps_its_events(alloc, mine):
 
 
 def test_a_checkpoint_that_cannot_be_written_costs_no_policy(alloc, mine, monkeypatch):
-    """Where the disk has no room for the whole run, the networks of its last generation are still stored."""
+    """If the checkpoint does not fit on the disk, the networks of the last generation are still stored."""
     save = module_of_training.Trainer.save
 
     def fail(self, path):

@@ -7,7 +7,7 @@ from alloc.allocators.learned.training import tune as module
 
 @pytest.mark.needs("optuna")
 def test_the_best_is_told_as_options_of_train(alloc, monkeypatch):
-    """What a study ends with can be pasted behind `alloc train`."""
+    """The best hyperparameters are printed as options of `alloc train`."""
 
     def tune(study, parameters, trials, limits, *, seed, on_trial):
         study.optimize(lambda trial: trial.suggest_float("learning_rate", 0.5, 0.5), trials, callbacks=[on_trial])
@@ -19,7 +19,7 @@ def test_the_best_is_told_as_options_of_train(alloc, monkeypatch):
 
 
 def test_bad_usage(alloc):
-    """Unknown methods, families and folders are told in one line."""
+    """Unknown methods, families and folders are one-line errors."""
     for options in (
         ("gapo", "--study", "s.db"),
         ("ppo", "--study", "nowhere/s.db"),

@@ -12,7 +12,7 @@ from alloc.problems.text import one_line, percent
 
 
 def test_control_characters_cannot_break_the_line():
-    """Whatever an id or a file name holds, the line stays one line."""
+    """Messages stay on one line, whatever characters ids or file names contain."""
     assert one_line("a\nb\x1b[2J\tc") == "a b [2J c"
 
 
@@ -20,12 +20,12 @@ def test_control_characters_cannot_break_the_line():
     ("share", "text"), [(None, "-"), (0.0, "0 %"), (4e-7, "0 %"), (0.0321, "3.2 %"), (1.0, "100 %"), (0.5, "50 %")]
 )
 def test_percent(share, text):
-    """Shares read well, and proven gaps are 0 %."""
+    """Shares are readable, and proven gaps are 0 %."""
     assert percent(share) == text
 
 
 def test_table_is_aligned():
-    """Text columns go left, figures go right."""
+    """Text is left-aligned, numbers are right-aligned."""
     assert table(["id", "T"], [["a", "10"], ["bcd", "9"]]) == "id    T\n---  --\na    10\nbcd   9"
 
 
@@ -37,7 +37,7 @@ def test_wide_letters_take_two_columns():
 
 
 def test_streams_without_unicode(monkeypatch):
-    """A terminal that cannot show a letter gets its escape instead of an exception."""
+    """Characters that a terminal cannot encode are escaped, without an exception."""
     stream = io.TextIOWrapper(io.BytesIO(), encoding="ascii")
     monkeypatch.setattr(sys, "stderr", stream)
     say("Z\u00fcrich")
@@ -45,7 +45,7 @@ def test_streams_without_unicode(monkeypatch):
 
 
 def test_write_protected_places_are_told(tmp_path, monkeypatch):
-    """A file that may not be written is found before the run, as the writing itself would find it."""
+    """A write-protected file is detected before the run, with the same error as on writing."""
     (tmp_path / "x.json").touch()
     monkeypatch.setattr("os.access", lambda path, mode: False)
     with pytest.raises(InputError, match="cannot be written: it is write-protected"):
@@ -53,7 +53,7 @@ def test_write_protected_places_are_told(tmp_path, monkeypatch):
 
 
 class Bare:
-    """What a program may put in the place of a stream: it takes text, and has nothing else."""
+    """A minimal replacement of a stream, which only has `write`."""
 
     def __init__(self) -> None:
         self.text = ""
@@ -63,7 +63,7 @@ class Bare:
 
 
 def test_streams_that_can_only_be_written_to(alloc, small, monkeypatch):
-    """Neither `isatty` nor `flush` is needed, whatever the command; a closed stream is no terminal."""
+    """No command needs `isatty` or `flush`; a closed stream is not a terminal."""
     for arguments in (
         ("solve", "small.json", "--method", "greedy"),
         ("compare", "small.json", "--methods", "greedy"),
@@ -94,5 +94,5 @@ def test_streams_that_can_only_be_written_to(alloc, small, monkeypatch):
     ],
 )
 def test_json_is_that_of_the_standard_library(value: object) -> None:
-    """Large objects are encoded another way, which nobody can tell."""
+    """The fast encoding of large objects gives the same text."""
     assert to_json(value) == json.dumps(value, indent=2) + "\n"

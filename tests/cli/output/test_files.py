@@ -1,4 +1,4 @@
-"""Files that a command reads are not replaced by what it writes, nor one output by another."""
+"""Outputs of a command must not replace its inputs or each other."""
 
 import json
 import os
@@ -29,7 +29,7 @@ from alloc.allocators.learned.network.actor_critic import ActorCritic, NetworkSi
     ],
 )
 def test_outputs_that_clash_are_refused(alloc, small, arguments):
-    """One line says which two names are one file, and every file stays as it was."""
+    """One line says which two names are the same file, and no file is changed."""
     Path("nowhere").mkdir()
     Path("link.json").symlink_to("small.json")
     shutil.copy("small.json", "other.json")
@@ -43,7 +43,7 @@ def test_outputs_that_clash_are_refused(alloc, small, arguments):
 
 
 def test_a_start_may_be_replaced_by_what_is_better(alloc, small):
-    """An answer may take the place of the one that it began with, and devices take all."""
+    """A result may replace the one that it started from, and devices may be written repeatedly."""
     assert alloc("solve", "small.json", "--method", "greedy", "--output", "best.json").code == 0
     again = ("solve", "small.json", "--method", "greedy", "--start", "best.json", "--output", "best.json")
     assert alloc(*again).code == 0
@@ -69,7 +69,7 @@ RUNS = [
 
 @pytest.fixture
 def full_disk(monkeypatch):
-    """Every file may be made, and none may be filled."""
+    """A disk on which files can be created but not written."""
 
     def fail(*_):
         raise OSError(28, "No space left on device")
@@ -79,7 +79,7 @@ def full_disk(monkeypatch):
 
 @pytest.mark.parametrize("arguments", RUNS)
 def test_what_cannot_be_written_after_a_run_is_printed(alloc, small, full_disk, arguments):
-    """A disk that is full by the end of a run loses nothing: what was found is on standard output, with exit code 2."""
+    """If the disk is full at the end of a run, the result is on standard output, with exit code 2."""
     ran = alloc(*arguments)
     assert ran.code == 2
     assert ran.err.splitlines()[-1] == f"alloc: {arguments[-1]}: cannot be written: no space left on device"
@@ -92,13 +92,13 @@ def test_what_cannot_be_written_after_a_run_is_printed(alloc, small, full_disk, 
 
 @pytest.mark.parametrize("arguments", RUNS)
 def test_what_is_printed_anyway_is_printed_once(alloc, small, full_disk, arguments):
-    """With --json standard output holds one document, whatever fails beside it."""
+    """With --json standard output has exactly one document, even if other outputs fail."""
     ran = alloc(*arguments, "--json")
     assert (ran.code, ran.json["format"].split("-")[0]) == (2, "alloc")
 
 
 def test_a_picture_is_drawn_although_the_result_cannot_be_written(alloc, small, monkeypatch):
-    """One thing that fails does not keep the others from being done."""
+    """One failing output does not prevent the others."""
     replace = os.replace
 
     def fail(begin, end):
@@ -114,7 +114,7 @@ def test_a_picture_is_drawn_although_the_result_cannot_be_written(alloc, small, 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="a device that is always full")
 def test_full_standard_output_leaves_standard_error(small, tmp_path):
-    """Where standard output takes nothing, the result is on standard error, and a full device has the same end."""
+    """If standard output is closed or full, the result is on standard error."""
     command = [sys.executable, "-m", "alloc.cli", "solve", "small.json", "--method", "greedy", "-q"]
     with open("/dev/full", "w") as full:
         ran = subprocess.run([*command, "--json"], stdout=full, stderr=subprocess.PIPE, text=True, cwd=tmp_path)
@@ -142,7 +142,7 @@ def test_full_standard_output_leaves_standard_error(small, tmp_path):
     ],
 )
 def test_descriptors_and_pipes_take_results(small, tmp_path, line, kept):
-    """What stood in a file that is appended to stays before the result, which is there once."""
+    """A result appended to a file follows the old content, and is written once."""
     (tmp_path / "log").write_text(kept)
     command = f"'{sys.executable}' -m alloc.cli solve small.json --method greedy -q"
     ran = subprocess.run(["bash", "-c", line.format(command)], capture_output=True, text=True, cwd=tmp_path)
@@ -154,7 +154,7 @@ def test_descriptors_and_pipes_take_results(small, tmp_path, line, kept):
 
 @pytest.mark.slow
 def test_file_names_that_are_no_utf_8(small, tmp_path):
-    """Names from an old disk are names: of instances, results, pictures, tables and policies, in every command."""
+    """Names that are not UTF-8 work for instances, results, pictures, tables and policies, in every command."""
     old = os.fsdecode(b"caf\xe9")
     shutil.copy(tmp_path / "small.json", tmp_path / "plain.json")
     document = json.loads((tmp_path / "small.json").read_text())

@@ -1,4 +1,4 @@
-"""`alloc solve` shows who does what, and writes it to files by their suffix."""
+"""`alloc solve` prints the plan as tables, and writes it to files by suffix."""
 
 import csv
 from pathlib import Path
@@ -27,7 +27,7 @@ def test_the_plan_is_not_printed_where_nobody_reads(alloc, small, option):
 
 
 def test_long_tables_are_cut():
-    """Up to 50 rows are shown, and how many more there are; groups name six agents."""
+    """At most 50 rows and six agents per group are shown, with the number of further ones."""
     instance = Instance(ability=[1] * 60, workload=[60])
     tasks, agents = plan_tables(scored_result(instance, Allocation([0] * 60)))
     assert "a1, a2, a3, a4, a5, a6 and 54 more" in tasks
@@ -36,7 +36,7 @@ def test_long_tables_are_cut():
 
 
 def test_names_are_shortened_without_becoming_equal():
-    """Long names that begin alike stay different, and headings have units."""
+    """Long names with equal beginnings stay different, and headings have units."""
     ids = [f"a building with a very long name, floor {number}" for number in (1, 2)]
     instance = Instance(ability=[1, 1], workload=[1, 1], task_ids=ids, units=Units(time="min", work="m2"))
     tasks, agents = plan_tables(scored_result(instance, Allocation([0, 1])))
@@ -46,14 +46,14 @@ def test_names_are_shortened_without_becoming_equal():
 
 
 def test_a_task_without_work_is_not_unserved():
-    """It is done at 0 by nobody; one with work and nobody is unserved."""
+    """Without work a task is done at 0; a task with work and no agent is unserved."""
     instance = Instance(ability=[1], workload=[0, 1, 1])
     rows = plan_tables(scored_result(instance, Allocation([1])))[0].splitlines()[2:]
     assert [row.split()[2:] for row in rows] == [["0", "0", "-"], ["1", "1", "a1"], ["unserved", "0", "-"]]
 
 
 def test_the_suffix_decides(alloc, small):
-    """A table and a map are written, and nothing goes to standard output."""
+    """A table and a map are written, and nothing is printed to standard output."""
     for name in ("plan.csv", "plan.html", "plan.xlsx"):
         ran = alloc("solve", "small.json", "--method", "greedy", "-q", "--output", name)
         assert (ran.code, ran.out, ran.err) == (0, "", "")
@@ -64,7 +64,7 @@ def test_the_suffix_decides(alloc, small):
 
 @pytest.mark.parametrize("name", ["plan.txt", "plan", "plan.geojson"])
 def test_other_suffixes_are_refused_before_the_run(alloc, small, monkeypatch, name):
-    """One line with exit code 2, and no method has run; the earth is no plane."""
+    """Unsupported suffixes, and GeoJSON without geographic positions, give one line and exit code 2 before the run."""
     monkeypatch.setattr("alloc.allocators.solve", lambda *_, **__: pytest.fail("it ran"))
     ran = alloc("solve", "small.json", "--output", name)
     assert (ran.code, ran.out, ran.err.count("\n")) == (2, "", 1)
@@ -73,5 +73,5 @@ def test_other_suffixes_are_refused_before_the_run(alloc, small, monkeypatch, na
 
 
 def test_a_device_takes_json(alloc, small):
-    """What has no suffix because it is no file takes the result as before."""
+    """A device, which has no suffix, gets JSON."""
     assert alloc("solve", "small.json", "--method", "greedy", "-q", "--output", "/dev/null").code == 0

@@ -21,7 +21,7 @@ def improvement(instance, tasks, bound=1.0):
 
 
 def test_line_tells_seconds_makespan_gap_and_energy(small):
-    """The line holds what is known: nothing yet, unserved tasks, or T with gap and energy."""
+    """The line shows what is known: nothing yet, unserved tasks, or T with gap and energy."""
     assert progress_line(2.0, None).startswith("   2.0 s  no allocation yet; ")
     assert "  1 task unserved" in progress_line(2.0, improvement(small, [0, 1, -1, -1, -1]))
     assert "2 tasks unserved" in progress_line(2.0, improvement(small, [0, -1, -1, -1, -1]))
@@ -29,7 +29,7 @@ def test_line_tells_seconds_makespan_gap_and_energy(small):
 
 
 def test_shown_on_terminals_and_cleared(small, monkeypatch):
-    """On a terminal the line appears after a while, and is gone at the end."""
+    """On a terminal the line appears after a while, and is cleared at the end."""
     monkeypatch.setattr(progress, "FIRST_AFTER_S", 0.01)
     monkeypatch.setattr(progress, "EVERY_S", 0.01)
     monkeypatch.setenv("TERM", "xterm")
@@ -44,7 +44,7 @@ def test_shown_on_terminals_and_cleared(small, monkeypatch):
 
 @pytest.mark.parametrize(("terminal", "shown"), [("dumb", False), ("unknown", False), ("xterm", True)])
 def test_terminals_that_cannot_clear_a_line_get_no_escape_codes(monkeypatch, terminal, shown):
-    """Editors and build logs that call themselves dumb are spared the codes that others move the cursor by."""
+    """Dumb terminals get no escape codes."""
     monkeypatch.setenv("TERM", terminal)
     monkeypatch.setattr(progress, "FIRST_AFTER_S", 0.0)
     monkeypatch.setattr(sys, "stderr", Terminal())
@@ -54,7 +54,7 @@ def test_terminals_that_cannot_clear_a_line_get_no_escape_codes(monkeypatch, ter
 
 
 def test_short_runs_and_files_see_nothing(monkeypatch):
-    """A run that is over at once shows nothing, and neither does one whose standard error is a file."""
+    """Nothing is shown for short runs, or if standard error is a file."""
     monkeypatch.setattr(sys, "stderr", Terminal())
     with Progress():
         pass

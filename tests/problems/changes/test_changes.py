@@ -1,4 +1,4 @@
-"""Agents and tasks come, go and move: the changed instance is that of the changed fields."""
+"""Agents and tasks are added, removed and moved: the changed instance agrees with the changed fields."""
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ SEEDS = range(60)
 
 
 def same_reach(instance: Instance) -> None:
-    """Whether the reach is that of the definitions."""
+    """Return whether the reach agrees with the definitions."""
     distance, able = reachable(instance)
     agents, tasks = np.indices((instance.n, instance.m)).reshape(2, -1)
     np.testing.assert_array_equal(instance.reach.allows(agents, tasks), able.ravel())
@@ -21,7 +21,7 @@ def same_reach(instance: Instance) -> None:
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_changes_against_the_definitions(seed: int) -> None:
-    """After each change, who can go where, and how far, is what the fields say; copies equal their models."""
+    """After each change, reachability and distances agree with the fields; copies equal their models."""
     instance = varied_instance(seed)
     more = instance.with_agents([{"id": "copy", "like": "a1"}, {"id": "blank", "ability": 2}])
     same_reach(more)
@@ -37,7 +37,7 @@ def test_changes_against_the_definitions(seed: int) -> None:
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_who_moves_returns_to_where_it_started(seed: int) -> None:
-    """The way home from each task is what it was, whether from a place or a task, with distances of its own or not."""
+    """Distances home are unchanged after moves to a place or a task, with or without given distances."""
     instance = varied_instance(seed, {"metric", "distances", "returns", "bases"} if seed % 2 else None)
     moved = instance.moved_to({"a1": "t2", "a2": instance.task_position[0].tolist()})
     assert moved.returns.tolist() == instance.returns.tolist()
@@ -49,7 +49,7 @@ def test_who_moves_returns_to_where_it_started(seed: int) -> None:
 
 
 def test_agents_that_started_together_share_a_base() -> None:
-    """It is called after the first of them, or otherwise where a base is called so; who does not return has none."""
+    """It is named after the first agent, unless that name is taken; agents that do not return have none."""
     instance = Instance(
         ability=[1] * 4,
         workload=[1],
@@ -65,7 +65,7 @@ def test_agents_that_started_together_share_a_base() -> None:
 
 
 def test_new_agents_return_where_they_are_told() -> None:
-    """To a base by its id, to where they start, or to the base of the agent that they are like."""
+    """They return to a base by its id, to their start, or to the base of the copied agent."""
     instance = Instance(ability=[1], workload=[1], bases={"north": (0, 1)}, return_base=[0])
     rows = [{"id": "b", "like": "a1"}, {"id": "c", "like": "a1", "returns": True}, {"id": "d", "ability": 1}]
     more = instance.with_agents([*rows, {"id": "e", "ability": 1, "returns": "north"}])
@@ -75,7 +75,7 @@ def test_new_agents_return_where_they_are_told() -> None:
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_without_tasks_nobody_moves(seed: int) -> None:
-    """Agents that start at a task that goes keep their place, and the distances that are given for it."""
+    """Agents that start at a removed task keep its place and given distances."""
     instance = varied_instance(seed)
     fewer = instance.without_tasks(["t1"])
     distance, able = reachable(instance)
@@ -108,14 +108,14 @@ def test_without_tasks_nobody_moves(seed: int) -> None:
     ],
 )
 def test_errors_say_what_to_mend(change, message: str) -> None:
-    """What cannot be meant is refused."""
+    """Invalid changes are refused."""
     instance = Instance(ability=[1, 2], workload=[3, 4], task_position=[[0, 0], [1, 1]], start_task=[0, 1])
     with pytest.raises(InputError, match=message):
         change(instance)
 
 
 def test_rows_of_a_copy() -> None:
-    """Distances that are given for an agent hold for its copies, in both directions; a blank agent has none."""
+    """Given distances of an agent also apply to its copies, in both directions; a new agent has none."""
     table = DistanceTable.of([("a1", "t1", 5.0), ("t2", "a1", 7.0)], ["a1"], ["t1", "t2"], missing="unreachable")
     instance = Instance(ability=[1], workload=[1, 1], distances=table)
     more = instance.with_agents([{"id": "c", "like": "a1"}, {"id": "b", "ability": 1}])

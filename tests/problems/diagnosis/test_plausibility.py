@@ -1,4 +1,4 @@
-"""What may be a mistake in an instance: each finding where it belongs, and none where all is well."""
+"""Findings about possible mistakes in instances, and no false alarms."""
 
 from pathlib import Path
 from typing import Any
@@ -13,7 +13,7 @@ EARTHQUAKES = Path(__file__).parents[3] / "examples" / "earthquakes"
 
 
 def fleet(**changes: Any) -> Instance:
-    """Return three agents and two tasks about which there is nothing to say, but for `changes`."""
+    """Return three agents and two tasks without findings, except for `changes`."""
     fields: dict[str, Any] = {
         "ability": (2, 3, 4),
         "workload": (6, 7),
@@ -70,7 +70,7 @@ DOUBTFUL = [
 
 @pytest.mark.parametrize(("changes", "field", "words"), DOUBTFUL)
 def test_what_may_not_be_meant_is_found(changes: dict[str, Any], field: str, words: str) -> None:
-    """One finding, with the field as files call it, and what is the matter."""
+    """There is one finding, with the name of the field in files and a description."""
     found = findings(fleet(**changes))
     assert [one.field for one in found] == [field]
     assert words in found[0].message
@@ -78,18 +78,18 @@ def test_what_may_not_be_meant_is_found(changes: dict[str, Any], field: str, wor
 
 
 def test_distances_of_ones_own_need_no_places() -> None:
-    """An agent without a place is no finding where a table says how far it has to go."""
+    """An agent without a place is not a finding if a table gives its distances."""
     table = DistanceTable.of([("a2", "t1", 3.0), ("a2", "t2", 4.0)], ("a1", "a2", "a3"), ("t1", "t2"))
     assert findings(fleet(agent_position=((0, 0), (np.nan, np.nan), (3, 1)), distances=table)) == ()
 
 
 def test_degrees_that_are_meant_are_no_finding() -> None:
-    """With the geographic metric degrees are right."""
+    """With the geographic metric, degrees are not a finding."""
     assert findings(fleet(**BERLIN, metric="geographic")) == ()
 
 
 def test_priority_without_effect() -> None:
-    """Priorities that differ change nothing where all is served; equal ones are not worth a word."""
+    """Different priorities are a finding if all tasks can be served; equal ones are not."""
     assert priority_without_effect(fleet()) is None
     found = priority_without_effect(fleet(priority=(1, 2)))
     assert found is not None
@@ -98,17 +98,17 @@ def test_priority_without_effect() -> None:
 
 @pytest.mark.parametrize("scenario", [1, 2, 3, 4])
 def test_no_false_alarm_on_the_scenarios_of_the_paper(scenario: int) -> None:
-    """There is nothing to say about them."""
+    """Scenarios of the paper have no findings."""
     for seed in range(3):
         assert findings(paper(scenario, seed)) == ()
 
 
 def test_no_false_alarm_on_random_instances() -> None:
-    """Nor about what `alloc generate random` draws where agents are enough and reach something."""
+    """Random instances with enough agents and reach have no findings."""
     for seed in range(20):
         assert findings(random_instance(Family(agents=40, tasks=8, speed=(0.5, 2.0)), seed)) == ()
 
 
 def test_no_false_alarm_on_the_example() -> None:
-    """Nor about the drones and earthquakes of Alaska, whose kilometres are no degrees."""
+    """The example of Alaska, with positions in kilometres, has no findings."""
     assert findings(read_instance(EARTHQUAKES / "alaska.json")) == ()

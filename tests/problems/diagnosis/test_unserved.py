@@ -1,4 +1,4 @@
-"""Why tasks stay unserved, in words and numbers."""
+"""Reasons for unserved tasks."""
 
 import numpy as np
 import pytest
@@ -22,7 +22,7 @@ FLEET = Instance(
 
 
 def test_reasons_by_hand() -> None:
-    """The nearest agent and what it lacks where nobody can, and what those do who could; the most urgent first."""
+    """The nearest agent and what it lacks, or what able agents do instead; highest priorities first."""
     reasons = {FLEET.task_ids[one.task]: one.reason for one in why_unserved(FLEET, Allocation([1, -1, 0]))}
     assert reasons == {
         "t3": "no agent can take it; nearest is a1: distance 30 exceeds the range 5",
@@ -36,7 +36,7 @@ def test_reasons_by_hand() -> None:
 
 
 def test_agents_that_are_pinned_are_called_so() -> None:
-    """Neither idle nor busy by choice: a dispatcher who pinned them knows what to undo."""
+    """Pinned agents are reported as pinned, not as idle or busy."""
     pinned = why_unserved(FLEET, Allocation([1, -1, -1]), most=1, pinned={0, 2})
     assert pinned[0].reason == "2 agents could take it: a1 is pinned to t2 (priority 2), a3 is pinned to no task"
     result = solve(FLEET, time_limit_s=2, pins={"a3": None})
@@ -45,7 +45,7 @@ def test_agents_that_are_pinned_are_called_so() -> None:
 
 
 def test_ways_home_that_are_not_given_are_told() -> None:
-    """A task from which the table has no way to the agent's base."""
+    """A task without a given distance to the agent's base is reported as such."""
     rows = [("a1", "t1", 1.0), ("a1", "t2", 2.0), ("t1", "north", 1.0)]
     table = DistanceTable.of(rows, ["a1"], ["t1", "t2"], "unreachable", ["north"])
     fleet = Instance(ability=[1], workload=[1, 1], distances=table, bases={"north": None}, return_base=[0])
@@ -75,7 +75,7 @@ def test_reasons_are_told_in_text_and_in_the_document() -> None:
 
 @pytest.mark.parametrize("seed", range(60))
 def test_reasons_hold(seed: int) -> None:
-    """Whoever is said to be able is, the nearest is not; in the answer, nobody able serves what is less urgent."""
+    """Agents said to be able are, the nearest is not; no able agent serves a task of lower priority."""
     for instance in (scarce_instance(seed), varied_instance(seed)):
         plan = solve(instance, "greedy", iterations=1).allocation
         assert plan is not None

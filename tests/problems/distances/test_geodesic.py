@@ -1,4 +1,4 @@
-"""Distances on the earth: those of pyproj, over the date line and the poles too."""
+"""Distances on the earth agree with pyproj, also across the date line and the poles."""
 
 import numpy as np
 import pytest
@@ -32,7 +32,7 @@ def test_distances_are_those_of_pyproj(unit: str) -> None:
 
 
 def test_altitude_and_unknown_places() -> None:
-    """Climbing counts by Pythagoras, and a place that is unknown is no distance away, as in (1)."""
+    """Altitude differences count by Pythagoras, and unknown places are at distance 0, as in (1)."""
     one = np.array([[0, 0, 3000.0], [0, 0, 0], [np.nan] * 3])
     other = np.array([[0, 0, -1000.0], [0, 0.0, 250], [1.0, 1, 0]])
     assert geodesic_distances(one, other, "m").tolist() == [4000, 250, 0]
@@ -40,7 +40,7 @@ def test_altitude_and_unknown_places() -> None:
 
 @pytest.mark.parametrize("shape", [(0,), (1,), (1, 1), (2, 1)])
 def test_distances_have_the_shape_of_the_places(shape: tuple[int, ...]) -> None:
-    """Whatever their number, one pair too, which some versions of numpy and pyproj warn of."""
+    """Any number of pairs works, also one, about which some versions of numpy and pyproj warn."""
     away = geodesic_distances(np.zeros((*shape, 3)), np.array([0.0, 0, 7]), "m")
     assert away.tolist() == np.full(shape, 7.0).tolist()
 

@@ -10,7 +10,7 @@ ROWS = [("a1", "t1", 3.0), ("t1", "a1", 4.0), ("t2", "t1", 0.5)]
 
 
 def test_rows_and_columns_make_the_same_table() -> None:
-    """Agents have the nodes from 0 on and tasks those after them, however the table is given; arrays are read-only."""
+    """Agents are nodes from 0 on, followed by tasks, in both forms of tables; arrays are read-only."""
     source, target, distance = zip(*ROWS, strict=True)
     for table in (
         DistanceTable.of(ROWS, AGENTS, TASKS, missing="unreachable"),
@@ -23,7 +23,7 @@ def test_rows_and_columns_make_the_same_table() -> None:
 
 
 def test_an_empty_table_is_one() -> None:
-    """A table without rows is a table, by which nobody can go anywhere if that is what it says."""
+    """A table without rows is valid, and makes all tasks unreachable if it says so."""
     table = DistanceTable.from_columns([], [], np.zeros(0), AGENTS, TASKS, missing="unreachable")
     assert (len(table.source), len(table.target), len(table.distance)) == (0, 0, 0)
 
@@ -40,6 +40,6 @@ def test_an_empty_table_is_one() -> None:
     ],
 )
 def test_rows_that_break_a_rule(rows: list[tuple[str, str, float]], message: str) -> None:
-    """The first row that breaks a rule is told with its number and, where one id is wrong, that of the id."""
+    """The error for the first invalid row has its number and, for an invalid id, the column."""
     with pytest.raises(InputError, match=message):
         DistanceTable.of(rows, AGENTS, TASKS)

@@ -1,4 +1,4 @@
-"""Reach: distances and who can take what, against plain loops."""
+"""Reach: distances and reachability agree with plain loops."""
 
 import numpy as np
 import pytest
@@ -53,7 +53,7 @@ def test_limits_have_a_tolerance(field: str) -> None:
 
 
 def test_distances_do_not_depend_on_blocks() -> None:
-    """More distances than are worked out together come out as one by one."""
+    """Distances computed in several blocks equal single ones."""
     rng = np.random.default_rng(0)
     agents, tasks = rng.random((BLOCK // 100, 3)), rng.random((250, 3))
     instance = Instance(ability=np.ones(len(agents)), workload=np.ones(250), agent_position=agents, task_position=tasks)
@@ -63,6 +63,6 @@ def test_distances_do_not_depend_on_blocks() -> None:
 
 
 def test_read_only() -> None:
-    """Nobody changes what all share."""
+    """Shared arrays are read-only."""
     with pytest.raises(ValueError, match="read-only"):
         Instance(ability=[1], workload=[1]).reach.mask[0, 0] = False

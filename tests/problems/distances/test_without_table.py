@@ -1,4 +1,4 @@
-"""Metrics, own distances, rates and flights back where no table of all pairs is made: the same as with one."""
+"""Metrics, given distances, rates and flights back give the same results without a table of all pairs."""
 
 from collections.abc import Iterator
 from unittest.mock import patch
@@ -30,7 +30,7 @@ def tableless() -> Iterator[None]:
 @pytest.mark.usefixtures("tableless")
 @pytest.mark.parametrize("seed", range(120))
 def test_pairs_agree_with_the_table(seed: int) -> None:
-    """Distances, costs, who can take what, and the neighbours of each origin."""
+    """Distances, costs, reachability, and the neighbours of each origin agree."""
     lazy = varied_instance(seed).reach
     assert not lazy.has_table
     agents, tasks = np.indices((len(lazy.origin), len(lazy.goal))).reshape(2, -1)
@@ -52,7 +52,7 @@ def test_pairs_agree_with_the_table(seed: int) -> None:
 @pytest.mark.usefixtures("tableless")
 @pytest.mark.parametrize("method", ["greedy", pytest.param("local-search", marks=pytest.mark.slow)])
 def test_methods_for_large_instances(method: str) -> None:
-    """They serve what brute force serves, send nobody astray, and count the same energy."""
+    """They serve as many tasks as brute force, with feasible plans and the same energy."""
     allocator = load(method)
     for seed in range(16):
         instance = varied_instance(seed)

@@ -1,4 +1,4 @@
-"""The store of runs: rows, leases and what can be wrong with its file."""
+"""The store of runs: rows, leases and errors of its file."""
 
 import contextlib
 import os
@@ -53,7 +53,7 @@ def finish(store, run, ending=SOLVED):
 
 
 def test_a_run_comes_back_as_it_was_written(tmp_path):
-    """What ran, how it ended and the trace are the same after the file is opened again."""
+    """Run, ending and trace are the same after the file is reopened."""
     with Store(tmp_path / "runs.db") as store:
         assert store.claim([KEYS[0]]).key == KEYS[0]
         store.finish(RUNS[0], SOLVED)
@@ -71,7 +71,7 @@ def test_the_tables_have_the_fields_of_a_run_and_its_ending(tmp_path):
 
 
 def test_runs_are_claimed_once(tmp_path):
-    """Two commands on one file never get the same run, and neither gets one that has ended."""
+    """Two commands on one file never claim the same run, nor one that has ended."""
     with Store(tmp_path / "runs.db") as one, Store(tmp_path / "runs.db") as other:
         assert one.claim(KEYS).key == KEYS[0]
         assert other.claim(KEYS).key == KEYS[1]
@@ -83,7 +83,7 @@ def test_runs_are_claimed_once(tmp_path):
 
 
 def test_nothing_is_left_to_claim_while_others_work_on_it(tmp_path):
-    """Where all that is left is being run elsewhere there is no run to have, and none has ended."""
+    """If all remaining runs are leased by others, there is no run to claim, and none has ended."""
     with Store(tmp_path / "runs.db") as one, Store(tmp_path / "runs.db") as other:
         one.claim(KEYS[:1])
         claim = other.claim(KEYS[:1])
@@ -91,7 +91,7 @@ def test_nothing_is_left_to_claim_while_others_work_on_it(tmp_path):
 
 
 def test_a_lease_ends_with_its_process(tmp_path):
-    """A command that is killed gives its run back at once, to whoever asks."""
+    """The run of a killed command can be claimed by others at once."""
     code = "import sys, time; from alloc.allocators.experiments.store.store import Store; s = Store(sys.argv[1]);"
     code += " print(s.claim([sys.argv[2]]).key, flush=True); time.sleep(60)"
     child = subprocess.Popen([sys.executable, "-c", code, tmp_path / "runs.db", KEYS[0]], stdout=subprocess.PIPE)
@@ -109,7 +109,7 @@ def test_a_lease_ends_with_its_process(tmp_path):
 
 
 def test_a_lease_that_is_not_renewed_expires(tmp_path, monkeypatch):
-    """A process of which nothing is known, as on another machine, loses its run in the end, and its result with it."""
+    """A process that cannot be observed, as on another machine, finally loses its run; its result is rejected."""
     with Store(tmp_path / "runs.db") as one, Store(tmp_path / "runs.db") as other:
         one.claim(KEYS[:2])
         later = time.time() + store_module.LEASE_S + 1
@@ -126,7 +126,7 @@ def test_a_lease_that_is_not_renewed_expires(tmp_path, monkeypatch):
 
 
 def test_failures_are_run_again_once_where_asked(tmp_path):
-    """What failed before is run again once where that is asked for; a package may have come meanwhile in any case."""
+    """Failed runs are retried once on request; runs with a missing package are always retried."""
     with Store(tmp_path / "runs.db") as store:
         finish(store, RUNS[0], Ending(outcome=Outcome.FAILED))
         finish(store, RUNS[1], Ending(outcome=Outcome.MISSING_PACKAGE))
@@ -142,7 +142,7 @@ def test_failures_are_run_again_once_where_asked(tmp_path):
 
 @pytest.mark.parametrize("field", [field.name for field in fields(Run)])
 def test_every_field_decides_a_run(field):
-    """Runs that differ in anything at all have different keys."""
+    """Runs that differ in any field have different keys."""
     old = getattr(RUNS[0], field)
     other = replace(RUNS[0], **{field: 7 if old is None or isinstance(old, int | float) else old + "x"})
     assert other.key != RUNS[0].key
@@ -150,7 +150,7 @@ def test_every_field_decides_a_run(field):
 
 
 def test_instances_are_known_by_content():
-    """The name of an instance does not count, any number in it does."""
+    """The key depends on every number of an instance, but not on its name."""
     one = Instance(name="one", ability=[1, 2], workload=[3])
     assert fingerprint(one) == fingerprint(replace(one, name="other"))
     assert fingerprint(one) != fingerprint(replace(one, workload=[3.0000001]))
@@ -158,7 +158,7 @@ def test_instances_are_known_by_content():
 
 
 def test_a_store_of_an_earlier_version_keeps_its_runs(tmp_path):
-    """Runs that were written before there were missions are found under the same keys."""
+    """Runs from before missions were supported are found under the same keys."""
     with sqlite3.connect(tmp_path / "runs.db") as old:
         old.executescript(MIGRATIONS[0] + f"; PRAGMA application_id = {APPLICATION}; PRAGMA user_version = 1;")
         values = {**asdict(RUNS[0]), **asdict(SOLVED), "trace": "[]", "key": OLD_KEY}
@@ -172,7 +172,7 @@ def test_a_store_of_an_earlier_version_keeps_its_runs(tmp_path):
 
 
 def test_missions_are_known_by_content():
-    """The name of a mission does not count, what happens in it does."""
+    """The key depends on the events of a mission, but not on its name."""
     one = random_mission(MissionParameters(agents=3, tasks=4), 1)
     renamed = Mission(replace(one.instance, name="other"), **_rest(one))
     assert fingerprint(renamed) == fingerprint(one)
@@ -184,7 +184,7 @@ def _rest(mission):
 
 
 def test_policies_count_by_content(tmp_path):
-    """A policy file of the same name with another content is another parameter; the order of parameters is none."""
+    """Policy files are compared by content, not by name; the order of parameters does not matter."""
     file = tmp_path / "p.safetensors"
     file.write_bytes(b"one")
     before = canonical({"b": 1, "policy": str(file)})
@@ -209,7 +209,7 @@ def test_versions_name_this_package():
 
 
 def test_owners_are_gone_with_their_process():
-    """This process is there; one with the same id that began at another time is not; elsewhere nothing is known."""
+    """This process is alive; one with its id but another start time is gone; on other machines it is unknown."""
     place, pid, started, token = this_process().split(" ")
     assert not is_gone(this_process())
     assert is_gone(" ".join([place, pid, f"{started}0", token]))
@@ -217,7 +217,7 @@ def test_owners_are_gone_with_their_process():
 
 
 def test_an_older_store_is_brought_up_to_date(tmp_path, monkeypatch):
-    """A file of an earlier version keeps its runs and has what is new."""
+    """A file of an earlier version keeps its runs and gets the new columns and tables."""
     with Store(tmp_path / "runs.db") as store:
         finish(store, RUNS[0])
     monkeypatch.setattr(store_module, "MIGRATIONS", (*MIGRATIONS, "CREATE TABLE later (x TEXT)"))
@@ -229,7 +229,7 @@ def test_an_older_store_is_brought_up_to_date(tmp_path, monkeypatch):
 
 
 def test_two_commands_begin_a_store_at_once(tmp_path, monkeypatch):
-    """A file that another command makes a store of while this one looks at it is taken for what it becomes."""
+    """A file that another command initialises at the same time is recognised as a store."""
     monkeypatch.setattr(store_module, "BUSY_S", 0.05)
     connect, others = sqlite3.connect, []
 
@@ -290,7 +290,7 @@ def test_instances_and_plans_are_kept(tmp_path):
 
 
 def test_a_later_store_is_refused(tmp_path):
-    """A file of a later version is left alone, in one line."""
+    """A file of a later version is refused in one line and not changed."""
     Store(tmp_path / "runs.db").close()
     sqlite3.connect(tmp_path / "runs.db").execute("PRAGMA user_version = 99")
     with pytest.raises(InputError, match=r"runs\.db: is a store of version 99.*update alloc"):
@@ -298,7 +298,7 @@ def test_a_later_store_is_refused(tmp_path):
 
 
 def test_other_files_are_no_stores(tmp_path):
-    """A text, and a database of another program, are refused in one line and left as they were."""
+    """A text file, and a database of another program, are refused in one line and not changed."""
     (tmp_path / "text").write_text("instance,method\n" * 100)
     with pytest.raises(InputError, match="is not a store of runs"):
         Store(tmp_path / "text")
@@ -315,7 +315,7 @@ def test_other_files_are_no_stores(tmp_path):
 
 
 def test_a_damaged_store_is_told(tmp_path):
-    """A file whose pages were overwritten is told as damaged, in one line."""
+    """A file with overwritten pages is reported as damaged, in one line."""
     with Store(tmp_path / "runs.db") as store:
         finish(store, RUNS[0])
     data = bytearray((tmp_path / "runs.db").read_bytes())
@@ -326,7 +326,7 @@ def test_a_damaged_store_is_told(tmp_path):
 
 
 def test_a_locked_store_is_told(tmp_path, monkeypatch):
-    """A lock of another program is waited out for a while, and then told; what the store holds is kept."""
+    """A lock of another program is reported after a while; the contents of the store are kept."""
     monkeypatch.setattr(store_module, "BUSY_S", 0.05)
     with Store(tmp_path / "runs.db") as store:
         finish(store, RUNS[0])
@@ -340,7 +340,7 @@ def test_a_locked_store_is_told(tmp_path, monkeypatch):
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root writes to anything")
 def test_a_read_only_store_is_told(tmp_path):
-    """A file that may not be written is told, in one line."""
+    """A write-protected file is reported in one line."""
     Store(tmp_path / "runs.db").close()
     (tmp_path / "runs.db").chmod(0o444)
     with pytest.raises(InputError, match="read-only"):
@@ -349,7 +349,7 @@ def test_a_read_only_store_is_told(tmp_path):
 
 @pytest.fixture
 def small_files():
-    """Lets files grow to 200 kB and no further, as on a disk that is full then."""
+    """Limits files to 200 kB, as if the disk were full then."""
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
     resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, before[1]))
@@ -360,7 +360,7 @@ def small_files():
 
 @pytest.mark.usefixtures("small_files")
 def test_a_full_disk_loses_nothing(tmp_path):
-    """Where there is no room for a row it is told in one line; the rows before are kept, and there is no half row."""
+    """A full disk is reported in one line; earlier rows are kept, and no row is incomplete."""
     with Store(tmp_path / "runs.db") as store:
         finish(store, RUNS[0])
         with pytest.raises(InputError, match=r"disk is full|is full;"):

@@ -32,7 +32,7 @@ def test_table_has_a_row_per_instance_and_method(alloc, small, unservable):
 
 
 def test_headings_have_the_units_that_all_instances_share(alloc, small):
-    """T and energy stand with their units; where two instances disagree, numbers are bare."""
+    """T and energy have their units, unless instances disagree."""
     write_instance(replace(small, name="timed", units=Units(time="h", energy="kWh")), "timed.json")
     assert re.search(r" T \(h\) .* energy \(kWh\) ", alloc("compare", "timed.json", "--methods", "greedy").err)
     ran = alloc("compare", "small.json", "timed.json", "--methods", "greedy")
@@ -71,7 +71,7 @@ def test_a_refusal_is_a_row(alloc):
 
 @pytest.fixture
 def compared(monkeypatch):
-    """What `compare` is asked for, in place of runs: methods and seeds."""
+    """Records the methods and seeds passed to `compare`, instead of running them."""
     asked = []
     monkeypatch.setattr(
         "alloc.allocators.experiments.compare.compare",
@@ -88,7 +88,7 @@ def test_seeds(alloc, small, compared, text, seeds):
 
 
 def test_interrupted_comparison_prints_what_is_finished(alloc, small):
-    """Ctrl-C ends the comparison; the rows that are complete are printed."""
+    """Ctrl-C ends the comparison; complete rows are printed."""
     alloc("generate", "random", "--agents", "40", "--tasks", "13", "--real", "--seed", "2", "--output", "hard.json")
     threading.Timer(1.0, os.kill, (os.getpid(), signal.SIGINT)).start()
     ran = alloc("compare", "small.json", "hard.json", "--methods", "greedy,ga", "--time-limit", "30", "--json")
@@ -101,7 +101,7 @@ def test_interrupted_comparison_prints_what_is_finished(alloc, small):
 
 
 def test_methods_with_parameters_in_brackets(alloc, small, compared, monkeypatch):
-    """Commas within brackets separate parameters and parts of values; the rows carry the text as it is written."""
+    """Commas within brackets separate parameters and parts of values; labels in rows are as written."""
     loaded = []
     monkeypatch.setattr("alloc.allocators.load", lambda name, **settings: loaded.append((name, settings)) or name)
     text = "greedy, ga[population=40,rates=0.1,0.2,elite=true],auto,ga[population=400]"
@@ -113,13 +113,13 @@ def test_methods_with_parameters_in_brackets(alloc, small, compared, monkeypatch
 
 @pytest.mark.parametrize("methods", ["ga[population=3", "ga[population=3]x", "ga[population]", "ga[nonsense=3]"])
 def test_wrong_brackets_are_bad_usage(alloc, small, methods):
-    """What is not NAME[PARAMETER=VALUE,...], or names no parameter of the method, is one line and exit code 2."""
+    """Text that is not NAME[PARAMETER=VALUE,...], or an unknown parameter, gives one line and exit code 2."""
     ran = alloc("compare", "small.json", "--methods", methods)
     assert (ran.code, ran.out, ran.err.count("\n")) == (2, "", 1)
 
 
 def test_instances_are_named_alike_with_and_without_a_store(alloc):
-    """Folders, patterns and families are compared without a store as well, and folders and patterns of missions."""
+    """Folders, patterns and families also work without a store, and folders and patterns of missions."""
     alloc("generate", "random", "--agents", "4", "--tasks", "2", "--count", "2", "--seed", "1", "--output", "some")
     for source, names in (
         ("some", ["random-4x2-seed-1", "random-4x2-seed-2"]),

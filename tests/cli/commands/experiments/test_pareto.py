@@ -26,7 +26,7 @@ def test_front_as_json(alloc, small):
 
 
 def test_table_and_files(alloc, small):
-    """For people there is a table; the file is the front, from which another run can go on; the drawing is one."""
+    """A table is printed, the front is written to a file from which another run can start, and a plot is drawn."""
     ran = alloc("pareto", "small.json", "--method", "milp", "--output", "front.json", "--plot", "front.svg")
     assert (ran.code, ran.out) == (0, "")
     assert "saved" in ran.err.splitlines()[0]
@@ -40,7 +40,7 @@ def test_table_and_files(alloc, small):
 
 
 def test_one_point_is_drawn(alloc, unservable):
-    """Where a task stays unserved there is one point, a drawing all the same, and exit code 1."""
+    """With an unserved task there is one point, which is drawn, and exit code 1."""
     ran = alloc("pareto", "unservable.json", "--method", "milp", "--plot", "front.png")
     assert ran.code == 1
     plot_front(pareto(unservable, "milp", handle_signals=False), "expected.png")
@@ -48,7 +48,7 @@ def test_one_point_is_drawn(alloc, unservable):
 
 
 def test_one_point_with_energy_is_drawn(alloc, small):
-    """A front that ends after its first point has a width too: nothing but the table is printed."""
+    """A front with a single point can be drawn without warnings: only the table is printed."""
     ran = alloc("pareto", "small.json", "--method", "milp", "--points", "1", "--plot", "front.png")
     assert ran.code == 0
     assert "Warning" not in ran.err
@@ -65,7 +65,7 @@ def test_one_point_with_energy_is_drawn(alloc, small):
     ],
 )
 def test_broken_fronts_are_told(alloc, small, text, words):
-    """A front that breaks the rules: one line with the file and the place, exit code 2."""
+    """An invalid front gives one line with the file and the place, and exit code 2."""
     Path("front.json").write_text(text)
     ran = alloc("pareto", "small.json", "--start", "front.json")
     assert (ran.code, ran.out) == (2, "")
@@ -75,7 +75,7 @@ def test_broken_fronts_are_told(alloc, small, text, words):
 
 
 def test_ctrl_c_saves_the_front_so_far(alloc, small, monkeypatch):
-    """After Ctrl-C the front so far is saved, and says that it is not complete."""
+    """After Ctrl-C the front so far is saved and marked as incomplete."""
     monkeypatch.setattr(
         "alloc.cli.commands.experiments.pareto._show_point", lambda result: signal.raise_signal(signal.SIGINT)
     )

@@ -1,4 +1,4 @@
-"""``alloc report``: the page is written whole or not at all, and errors are one line."""
+"""``alloc report``: the page is written atomically, and errors are one line."""
 
 import pytest
 from stored_runs import fill
@@ -10,7 +10,7 @@ from alloc.cli.main import main
 
 @pytest.fixture(autouse=True)
 def store(tmp_path, monkeypatch):
-    """A store in the current folder; bundling the libraries takes seconds, and no test here looks at them."""
+    """A store in the current folder; libraries, which take seconds to bundle, are replaced."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(page, "libraries", lambda: {})
     fill(tmp_path / "runs.db", instances=1)
@@ -25,14 +25,14 @@ def test_the_page_is_written_and_its_runs_are_counted(tmp_path, capsys):
 
 
 def test_a_page_without_runs_has_a_note(tmp_path, capsys):
-    """A store that holds no runs yet is no error, but it is said."""
+    """A store without runs gives a note, not an error."""
     (tmp_path / "none.db").touch()
     assert main(["report", "none.db", "-o", "report.html"]) == 0
     assert capsys.readouterr() == ("", "note: there are no runs in none.db: report.html is empty\n")
 
 
 def test_progress_is_shown_on_a_terminal(monkeypatch, capsys):
-    """Who waits at a terminal is told how far it is, at most once a second."""
+    """Progress is shown on a terminal, at most once a second."""
     monkeypatch.setattr(report, "is_terminal", lambda stream: True)
     assert main(["report", "runs.db", "-o", "report.html"]) == 0
     assert capsys.readouterr().err == "wrote report.html: 6 runs\n"
@@ -64,7 +64,7 @@ def test_errors_are_one_line(tmp_path, capsys, arguments, message):
 
 
 def test_missing_packages_are_named(monkeypatch, capsys):
-    """What is not installed, and how to install it, in one line."""
+    """The missing package, and how to install it, are one line."""
     monkeypatch.setattr(libraries, "find_spec", lambda name: None if name == "itables" else name)
     assert main(["report", "runs.db", "-o", "report.html"]) == 2
     assert capsys.readouterr().err == (

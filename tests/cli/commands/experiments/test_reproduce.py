@@ -9,7 +9,7 @@ DOCS = Path(__file__).parents[4] / "docs" / "reproduction"
 
 
 def test_a_page_from_rows_alone(alloc, monkeypatch):
-    """With --page nothing is run: the page comes from the rows in the folder, and figures go beside them."""
+    """With --page nothing is run: page and figures are made from the rows in the folder."""
     drawn = []
     monkeypatch.setattr(figures, "draw_all", lambda learned, solved, folder: drawn.append(folder))
     shutil.copytree(DOCS, "here/reproduction", ignore=shutil.ignore_patterns("*.png"))
@@ -21,7 +21,7 @@ def test_a_page_from_rows_alone(alloc, monkeypatch):
 
 
 def test_a_short_run(alloc):
-    """Runs are made in processes and not made again; what was not run is said."""
+    """Runs are made in processes and not repeated; parts without runs are mentioned."""
     command = ("reproduce", "out", "--runs", "1", "--methods", "greedy", "--workers", "1")
     ran = alloc(*command)
     assert (ran.code, ran.err) == (2, "alloc: out/reproduction: holds no runs of methods that learn; make some first\n")
@@ -32,7 +32,7 @@ def test_a_short_run(alloc):
 
 
 def test_bad_usage(alloc):
-    """Unknown methods and folders without runs are told in one line."""
+    """Unknown methods and folders without runs are one-line errors."""
     for options in (("out", "--methods", "gapo"), ("nowhere", "--page"), ("out", "--runs", "0")):
         ran = alloc("reproduce", *options)
         assert (ran.code, ran.out, ran.err.count("\n")) == (2, "", 1)

@@ -1,4 +1,4 @@
-"""``alloc compare --store``: runs that are kept, and made once."""
+"""``alloc compare --store``: runs are stored, and made only once."""
 
 import csv
 import os
@@ -25,7 +25,7 @@ QUICK = ("--iterations", "5", "--store", "runs.db", "--workers", "1")
 
 @pytest.fixture
 def plugin(tmp_path, monkeypatch):
-    """Installs the methods that misbehave for commands in this process and others, and returns a folder for notes."""
+    """Installs the misbehaving methods for commands in this and other processes, and returns a folder for records."""
     folder = tmp_path / "plugin"
     folder.mkdir()
     evil_methods.install(folder)
@@ -38,7 +38,7 @@ def plugin(tmp_path, monkeypatch):
 
 @pytest.fixture
 def in_process(monkeypatch):
-    """Makes runs in this process."""
+    """Executes runs in this process."""
     monkeypatch.setattr(stored, "_place", lambda keeping: InProcess())
 
 
@@ -49,7 +49,7 @@ def begun():
 
 @pytest.mark.usefixtures("in_process")
 def test_only_what_is_missing_is_run(alloc, plugin):
-    """A seed, an instance or a method more runs what they add alone; the table is of what was asked for."""
+    """With an additional seed, instance or method, only missing runs are made; the table has the requested ones."""
     first = alloc("compare", f"{TINY}:1", "--methods", "nap", *QUICK, "--json")
     assert (first.code, len(begun())) == (0, 1)
     more = alloc("compare", f"{TINY}:0-1", "--methods", "greedy,nap", "--seeds", "2", *QUICK, "--json")
@@ -68,7 +68,7 @@ def test_only_what_is_missing_is_run(alloc, plugin):
 
 @pytest.mark.usefixtures("in_process")
 def test_rows_are_those_of_a_comparison_without_a_store(alloc):
-    """The figures are the same as without a store, but for the seconds."""
+    """Rows are the same as without a store, except for times."""
     words = ("compare", f"{TINY}:0-1", "--methods", "greedy,ga[population=4]", "--seeds", "2", "--iterations", "5")
     kept = alloc(*words, "--store", "runs.db", "--json").json["rows"]
     alloc("generate", "random", "--agents", "3", "--tasks", "2", "--count", "2", "--output", "made")
@@ -81,7 +81,7 @@ def test_rows_are_those_of_a_comparison_without_a_store(alloc):
 
 @pytest.mark.usefixtures("in_process")
 def test_other_budgets_are_other_runs(alloc):
-    """A run with another budget does not count, and the store says that it has some."""
+    """Runs with another budget are ignored, with a note."""
     alloc("compare", f"{TINY}:0", "--methods", "greedy", *QUICK)
     other = alloc("compare", f"{TINY}:0", "--methods", "greedy", "--iterations", "6", "--store", "runs.db")
     assert "1 run made" in other.err
@@ -90,7 +90,7 @@ def test_other_budgets_are_other_runs(alloc):
 
 @pytest.mark.usefixtures("in_process")
 def test_differences_are_printed_and_reported(alloc):
-    """Below the table stands how methods differ from the first one; a report holds that, or all runs."""
+    """Differences from the first method are printed below the table; a report contains these, or all runs."""
     words = ("compare", f"{TINY}:0-2", "--methods", "greedy,local-search", *QUICK)
     ran = alloc(*words, "--report", "table.md", "--report", "runs.csv")
     assert ran.code == 0
@@ -103,7 +103,7 @@ def test_differences_are_printed_and_reported(alloc):
 
 @pytest.mark.slow
 def test_failures_have_rows_and_are_tried_again_where_asked(alloc, plugin):
-    """A failure has a row with the reason; it is run again with --retry alone, which leaves good runs as they are."""
+    """A failure has a row with the reason; it is repeated only with --retry, which keeps good runs."""
     words = ("compare", f"{TINY}:0", "--methods", "leave,nap", *QUICK)
     ran = alloc(*words)
     assert ran.code == 0
@@ -140,7 +140,7 @@ def test_sources_of_instances(alloc):
     ],
 )
 def test_wrong_sources_are_one_line(alloc, source, message):
-    """A source that is none is told in one line, before anything runs."""
+    """An invalid source is a one-line error before any run."""
     Path("list.csv").write_text("file\nx.json\n")
     ran = alloc("compare", source, "--methods", "greedy", *QUICK)
     assert ran.code == 2
@@ -157,7 +157,7 @@ def test_wrong_sources_are_one_line(alloc, source, message):
     ],
 )
 def test_wrong_methods_are_one_line(alloc, methods, message):
-    """A method or a parameter that is none is told before anything runs."""
+    """An unknown method or parameter is an error before any run."""
     ran = alloc("compare", f"{TINY}:0", "--methods", methods, *QUICK)
     assert ran.code == 2
     assert message in ran.err
@@ -166,7 +166,7 @@ def test_wrong_methods_are_one_line(alloc, methods, message):
 
 @pytest.mark.usefixtures("in_process")
 def test_a_method_without_any_figure_is_reported(alloc, plugin):
-    """A method that refuses everything, or whose package is missing, has dashes in the report and a reason each."""
+    """A method that refuses everything, or lacks a package, has dashes and a reason in the report."""
     words = ("compare", f"{TINY}:0", "covering[agents=4,tasks=2]:0", "--methods", "greedy,refuse,missing", *QUICK)
     ran = alloc(*words, "--report", "table.md")
     assert ran.code == 0
@@ -177,7 +177,7 @@ def test_a_method_without_any_figure_is_reported(alloc, plugin):
 
 @pytest.mark.usefixtures("in_process")
 def test_a_full_disk_is_one_line_and_loses_nothing(alloc, plugin):
-    """Where the disk is full half-way, what was written stays; with room the same command goes on from there."""
+    """If the disk becomes full, stored runs are kept; with free space the same command resumes from there."""
     words = ("compare", f"{TINY}:0-1", "--methods", "greedy,answer", "--seeds", "10", *QUICK)
     before, handler = resource.getrlimit(resource.RLIMIT_FSIZE), signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
     resource.setrlimit(resource.RLIMIT_FSIZE, (150_000, before[1]))
@@ -213,7 +213,7 @@ def test_a_full_disk_is_one_line_and_loses_nothing(alloc, plugin):
     ],
 )
 def test_wrong_options_are_one_line(alloc, words, message):
-    """What makes no sense is told in one line, before anything runs."""
+    """Invalid options are one-line errors before any run."""
     Path("text").write_text("no database\n" * 100)
     ran = alloc("compare", f"{TINY}:0", "--methods", "greedy", *words)
     assert ran.code == 2
@@ -222,7 +222,7 @@ def test_wrong_options_are_one_line(alloc, words, message):
 
 
 def test_ctrl_c_keeps_what_has_ended(plugin):
-    """Ctrl-C prints the rows of what has ended, with exit code 1; nothing is left running, and nothing leased."""
+    """Ctrl-C prints the rows of completed runs, with exit code 1; no run is in progress or leased afterwards."""
     command = [sys.executable, "-m", "alloc.cli", "compare", f"{TINY}:0", "--methods", "nap", "--seeds", "500", *QUICK]
     process = subprocess.Popen(command, cwd=plugin, stderr=subprocess.PIPE, text=True)
     naps, limit = plugin / "naps", time.monotonic() + 60
@@ -238,7 +238,7 @@ def test_ctrl_c_keeps_what_has_ended(plugin):
 
 
 def test_runs_end_with_a_command_that_is_killed(plugin):
-    """Where a command is killed, its run ends with it, and so do processes that the run has started."""
+    """If a command is killed, its run and all processes that the run has started end, too."""
     command = [sys.executable, "-m", "alloc.cli", "compare", f"{TINY}:0", "--methods", "fork", "--seeds", "99", *QUICK]
     process = subprocess.Popen(command, cwd=plugin, stderr=subprocess.DEVNULL)
     noted, limit = plugin / "forked", time.monotonic() + 60
@@ -260,7 +260,7 @@ def _is_there(pid):
 
 @pytest.mark.slow
 def test_two_commands_that_are_killed_lose_no_run_and_make_none_twice(tmp_path):
-    """Of two commands on one store, killed now and then, every run is in the store once, and no lease is left."""
+    """With two commands on one store, killed repeatedly, every run is stored once, and no lease is left."""
     found = kill_often(tmp_path, seeds=3, kills=3, nap_s=0.4, workers=1, gap_s=(1.0, 2.0))
     assert found.kills >= 1
     assert (found.rows, found.solved, found.lost) == (12, 12, 0)
@@ -269,7 +269,7 @@ def test_two_commands_that_are_killed_lose_no_run_and_make_none_twice(tmp_path):
 
 @pytest.mark.usefixtures("in_process")
 def test_policies_in_missions_are_kept(alloc, plugin):
-    """Runs of policies are made once, in a process each; rows are those without a store, reports hold all measures."""
+    """Runs of policies are made once, in separate processes; rows equal those without a store; reports are complete."""
     alloc("generate", "mission", "--agents", "2", "--tasks", "2", "--seed", "1", "--output", "m.json")
     words = ("compare", "m.json", "--policies", "nearest,replan", "--seeds", "2")
     kept = alloc(*words, "--store", "runs.db", "--report", "table.md", "--report", "runs.csv", "--json")
@@ -296,7 +296,7 @@ def test_policies_in_missions_are_kept(alloc, plugin):
 
 
 def test_before_the_first_run_has_ended_there_is_nothing_to_compare(alloc, monkeypatch):
-    """Interrupted at once, it says so, and that the same command goes on, but prints no table of differences."""
+    """If interrupted at once, a note says how to resume, and there is no table of differences."""
     monkeypatch.setattr("alloc.allocators.experiments.campaign.Campaign.run", lambda self, stop: False)
     ran = alloc("compare", f"{TINY}:1", "--methods", "greedy,auction", *QUICK)
     assert (ran.code, ran.out) == (1, "")

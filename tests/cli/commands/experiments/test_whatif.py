@@ -9,7 +9,7 @@ from alloc.problems.formats import write_instance
 
 
 def test_table_answer_and_files(alloc, small):
-    """People get a table with a row for each fleet and the answer; the file holds the same, the drawing is one."""
+    """A table with a row per fleet and the answer is printed, and written to a file; a plot is drawn."""
     options = ("--add", "like a4", "--up-to", "2", "--remove", "a3", "--method", "milp")
     ran = alloc("whatif", "small.json", *options, "--output", "fleets.json", "--plot", "fleets.svg")
     assert (ran.code, ran.out) == (0, "")
@@ -28,14 +28,14 @@ def test_table_answer_and_files(alloc, small):
 
 
 def test_json_is_all_of_standard_output(alloc, small):
-    """With --json there is the document alone, and no table."""
+    """With --json only the document is printed, and no table."""
     ran = alloc("whatif", "small.json", "--remove", "a3", "--method", "milp", "--json", "--quiet")
     assert (ran.code, ran.err) == (0, "")
     assert ran.json["fleets"][1]["removed"] == ["a3"]
 
 
 def test_unserved_tasks_give_exit_code_1(alloc, unservable):
-    """Where a fleet cannot serve every task, the exit code says so."""
+    """The exit code is 1 if a fleet cannot serve every task."""
     ran = alloc("whatif", "unservable.json", "--add", "like a1", "--method", "greedy")
     assert ran.code == 1
     assert "One more like a1: 1 task unserved as before." in ran.err
@@ -63,7 +63,7 @@ def test_wrong_options_are_one_line(alloc, small, arguments, message):
 
 
 def test_ctrl_c_saves_the_fleets_so_far(alloc, small, monkeypatch):
-    """After Ctrl-C the fleets so far are saved, and it says that they are not all."""
+    """After Ctrl-C the fleets so far are saved and marked as incomplete."""
     monkeypatch.setattr(
         "alloc.cli.commands.experiments.whatif._show_fleet", lambda fleet: signal.raise_signal(signal.SIGINT)
     )
@@ -75,7 +75,7 @@ def test_ctrl_c_saves_the_fleets_so_far(alloc, small, monkeypatch):
 
 
 def test_units_stand_in_the_table(alloc):
-    """The units of the instance stand in the heading."""
+    """The heading has the units of the instance."""
     instance = Instance(ability=[1, 2], workload=[3], units=Units(time="min", energy="Wh"))
     write_instance(instance, "timed.json")
     head = alloc("whatif", "timed.json", "--add", "like a1", "--method", "greedy").err.splitlines()[0]
