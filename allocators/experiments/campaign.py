@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from multiprocessing import connection
 
 from alloc.allocators.experiments.isolation.cores import CAN_PIN, Cores
-from alloc.allocators.experiments.isolation.places import Handle, Here, Place
+from alloc.allocators.experiments.isolation.places import Handle, Place, ThisMachine
 from alloc.allocators.experiments.isolation.serve import Figures, Order
 from alloc.allocators.experiments.isolation.worker import Limits
 from alloc.allocators.experiments.store.key import Run
@@ -42,7 +42,7 @@ class Job:
 
 
 @dataclass(frozen=True)
-class Means:
+class Resources:
     """Resources for the runs; they do not affect results unless a run exceeds a limit.
 
     Attributes
@@ -82,7 +82,7 @@ class Campaign:
     store : Store
     jobs : sequence of Job
         In order of execution; all with the same budget and threads.
-    means : Means
+    resources : Resources
     on_end : callable
         Called with each run that this command has executed, and its ending.
     on_wait : callable
@@ -100,12 +100,12 @@ class Campaign:
         self,
         store: Store,
         jobs: Sequence[Job],
-        means: Means,
+        resources: Resources,
         on_end: Callable[[Run, Ending], None] = lambda run, ending: None,
         on_wait: Callable[[], None] = lambda: None,
         place: Place | None = None,
     ) -> None:
-        self._place = Here() if place is None else place
+        self._place = ThisMachine() if place is None else place
         self._store, self._on_end, self._on_wait = store, on_end, on_wait
         self._jobs = {job.run.key: job for job in jobs}
         self._pending = list(self._jobs)
@@ -113,12 +113,14 @@ class Campaign:
         self._threads = 1 if first is None else first.threads
         self._is_pinned = CAN_PIN and first is not None and first.is_timed
         limit = None if first is None else first.time_limit_s
-        self._workers, room = means.workers, self._place.room(self._threads)
-        _check_workers(means.workers, self._threads, room, pinned=self._is_pinned)
+        self._workers, room = resources.workers, self._place.room(self._threads)
+        _check_workers(resources.workers, self._threads, room, pinned=self._is_pinned)
         usual = math.inf if limit is None else OVERRUN * limit + OVERRUN_S
         self._limits = Limits(
-            usual if means.kill_after_s is None else means.kill_after_s,
-            self._place.memory_mb(means.workers or max(1, room)) if means.memory_mb is None else means.memory_mb,
+            usual if resources.kill_after_s is None else resources.kill_after_s,
+            self._place.memory_mb(resources.workers or max(1, room))
+            if resources.memory_mb is None
+            else resources.memory_mb,
         )
         self._slots: list[_Slot] = []
         self._revision = revision()

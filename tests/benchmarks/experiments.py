@@ -19,7 +19,7 @@ from pathlib import Path
 from kinds import KINDS, LARGE, VARIANTS
 
 from alloc.allocators import Budget
-from alloc.allocators.experiments.campaign import Campaign, Means
+from alloc.allocators.experiments.campaign import Campaign, Resources
 from alloc.allocators.experiments.report.standing import OF_BEST, OF_OTHERS, standing_tables
 from alloc.allocators.experiments.standings import Best, standings
 from alloc.allocators.experiments.store.outcome import Ending
@@ -97,7 +97,7 @@ def ran(
         label: (name, settings or {}) for label, (name, settings) in listed(",".join(methods), "--methods").items()
     }
     comparison = planned(store, instances, variants, [0], objective=objective, budget=budget, threads=threads)
-    Campaign(store, list(comparison.jobs.values()), Means(workers)).run(threading.Event())
+    Campaign(store, list(comparison.jobs.values()), Resources(workers)).run(threading.Event())
     return comparison, comparison.endings(store)
 
 

@@ -10,7 +10,7 @@ from multiprocessing import connection
 from types import ModuleType
 
 from alloc.allocators.experiments.isolation.cores import CAN_PIN, Cores, take
-from alloc.allocators.experiments.isolation.places import Handle, Here, Place
+from alloc.allocators.experiments.isolation.places import Handle, Place, ThisMachine
 from alloc.allocators.experiments.isolation.serve import Figures, Order
 from alloc.allocators.experiments.isolation.worker import Limits, Worker
 from alloc.allocators.experiments.store.key import this_machine
@@ -153,7 +153,7 @@ def make_run(order: bytes, limits: Limits, threads: int, *, is_timed: bool) -> F
         Whether the run waits for processors of its own.
     """
     if math.isinf(limits.memory_mb):
-        here = Here()
+        here = ThisMachine()
         limits = replace(limits, memory_mb=here.memory_mb(max(1, here.room(threads))))
     cores = Cores()
     while is_timed and CAN_PIN and not cores.numbers:

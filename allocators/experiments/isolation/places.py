@@ -81,7 +81,7 @@ class Place(Protocol):
         self.close()
 
 
-class Here(Place):
+class ThisMachine(Place):
     """The machine that the command runs on."""
 
     def __init__(self) -> None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from alloc.cli import options
-from alloc.cli.commands.experiments import options as kept
+from alloc.cli.commands.experiments import options as store_options
 from alloc.cli.commands.experiments.missions import compare_missions
 from alloc.cli.commands.experiments.sources import gather
 from alloc.cli.options import examples
@@ -90,14 +90,14 @@ def compare_command(
     deadline_ms: DeadlineOption = None,
     csv: CsvOption = None,
     json: options.JsonOption = False,
-    store: kept.StoreOption = None,
-    workers: kept.WorkersOption = None,
-    memory: kept.MemoryOption = None,
-    kill_after: kept.KillAfterOption = None,
-    retry: kept.RetryOption = False,
-    report: kept.ReportOption = None,
-    engine: kept.EngineOption = None,
-    address: kept.AddressOption = None,
+    store: store_options.StoreOption = None,
+    workers: store_options.WorkersOption = None,
+    memory: store_options.MemoryOption = None,
+    kill_after: store_options.KillAfterOption = None,
+    retry: store_options.RetryOption = False,
+    report: store_options.ReportOption = None,
+    engine: store_options.EngineOption = None,
+    address: store_options.AddressOption = None,
 ) -> None:
     """Compare methods on instances, or policies on missions.
 
@@ -106,7 +106,7 @@ def compare_command(
     from alloc.allocators import Budget
     from alloc.problems.formats import is_standard_output
 
-    keeping = kept.checked(store, workers, memory, kill_after, report, engine, address, retry=retry)
+    storage = store_options.checked(store, workers, memory, kill_after, report, engine, address, retry=retry)
     written = [("--csv", csv), *(("--report", file) for file in report or ())]
     check_outputs(*written, read=[("--store", store), *(("INSTANCE", instance) for instance in instances)])
     if json and csv is not None and is_standard_output(csv):
@@ -123,12 +123,12 @@ def compare_command(
     if policies is not None:
         listed = options.listed(policies, "--policies")
         asked_of = (instances, listed, numbers, knowledge, deadline_ms or None, csv)
-        raise typer.Exit(compare_missions(keeping, *asked_of, json=json))
+        raise typer.Exit(compare_missions(storage, *asked_of, json=json))
     assert methods is not None
     budget = Budget(options.time_limit(time_limit, iterations), iterations, target_gap)
-    if keeping is not None:
+    if storage is not None:
         asked = (instances, methods, numbers, objective, budget, threads, csv)
-        raise typer.Exit(_compare_in_store(keeping, *asked, json=json))
+        raise typer.Exit(_compare_in_store(storage, *asked, json=json))
     raise typer.Exit(_compare(instances, _methods(methods), numbers, objective, budget, threads, csv, json=json))
 
 
@@ -146,7 +146,7 @@ def _check_kind(
 
 
 def _compare_in_store(
-    keeping: kept.Keeping,
+    storage: store_options.StoreOptions,
     files: Sequence[str],
     methods: str,
     seeds: list[int],
@@ -166,10 +166,10 @@ def _compare_in_store(
     variants = {
         label: (name, settings or {}) for label, (name, settings) in options.listed(methods, "--methods").items()
     }
-    found, rows = compare_in_store(keeping, files, variants, seeds, objective.value, budget, threads)
+    found, rows = compare_in_store(storage, files, variants, seeds, objective.value, budget, threads)
     units = common_units([one.units for one in found.comparison.instances if isinstance(one, Instance)])
     _write(rows, csv, units, json=json)
-    return conclude(keeping, found, rows, quiet=json or (csv is not None and is_standard_output(csv)))
+    return conclude(storage, found, rows, quiet=json or (csv is not None and is_standard_output(csv)))
 
 
 def _compare(

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING
 
-from alloc.cli.commands.experiments.options import Keeping
+from alloc.cli.commands.experiments.options import StoreOptions
 from alloc.cli.commands.experiments.sources import gather_missions
 from alloc.cli.commands.experiments.stored import make_missing
 from alloc.cli.output.console import note, say, table
@@ -27,7 +27,7 @@ Listed = Mapping[str, tuple[str, dict[str, object] | None]]
 
 
 def compare_missions(
-    keeping: Keeping | None,
+    storage: StoreOptions | None,
     files: Sequence[str],
     policies: Listed,
     seeds: list[int],
@@ -47,7 +47,7 @@ def compare_missions(
     missions = gather_missions(files)
     units = common_units([mission.instance.units for mission in missions])
     asked = (missions, policies, seeds, knowledge, deadline_ms)
-    found = _in_store(keeping, *asked) if keeping is not None else _at_once(*asked, units)
+    found = _in_store(storage, *asked) if storage is not None else _at_once(*asked, units)
     differences = paired_differences(found.rows)
     document: dict[str, object] = {
         "format": "alloc-mission-comparison/1",
@@ -98,7 +98,7 @@ def _at_once(
 
 
 def _in_store(
-    keeping: Keeping,
+    storage: StoreOptions,
     missions: "list[Mission]",
     policies: Listed,
     seeds: list[int],
@@ -123,11 +123,13 @@ def _in_store(
             store, missions, variants, seeds, knowledge=knowledge, deadline_ms=deadline_ms, machine=machine
         )
 
-    kept = make_missing(keeping, plan)
-    rows = policy_rows(kept.comparison, kept.endings)
-    for file in keeping.reports:
-        write_report(file, kept.comparison, kept.endings, partial(mission_tables, kept.comparison, kept.endings, rows))
-    return _Found(rows, kept.is_complete, kept.notes)
+    stored = make_missing(storage, plan)
+    rows = policy_rows(stored.comparison, stored.endings)
+    for file in storage.reports:
+        write_report(
+            file, stored.comparison, stored.endings, partial(mission_tables, stored.comparison, stored.endings, rows)
+        )
+    return _Found(rows, stored.is_complete, stored.notes)
 
 
 def _outcome(row: "PolicyRow", units: "Units") -> str:

@@ -77,7 +77,7 @@ AddressOption = Annotated[
 
 
 @dataclass(frozen=True)
-class Keeping:
+class StoreOptions:
     """The store of a comparison and its options."""
 
     store: str
@@ -100,7 +100,7 @@ def checked(
     address: str | None,
     *,
     retry: bool,
-) -> Keeping | None:
+) -> StoreOptions | None:
     """Return the store with its options, None if there is none; raise an error for options that need one."""
     if store is None:
         given = {"workers": workers, "memory": memory, "kill-after": kill_after, "report": reports, "retry": retry}
@@ -113,8 +113,8 @@ def checked(
         raise typer.BadParameter("must be more than 0 seconds", param_hint="'--kill-after'")
     if address is not None and engine is not Engine.RAY:
         raise typer.BadParameter("can only be used with --engine ray", param_hint="'--address'")
-    means = (workers, _megabytes(memory), kill_after)
-    return Keeping(store, *means, tuple(reports or ()), retry, engine or Engine.PROCESSES, address)
+    resources = (workers, _megabytes(memory), kill_after)
+    return StoreOptions(store, *resources, tuple(reports or ()), retry, engine or Engine.PROCESSES, address)
 
 
 def _megabytes(text: str | None) -> float | None:

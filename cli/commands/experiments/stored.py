@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING
 
-from alloc.cli.commands.experiments.options import Engine, Keeping
+from alloc.cli.commands.experiments.options import Engine, StoreOptions
 from alloc.cli.commands.experiments.sources import gather
 from alloc.cli.output.console import is_terminal, note, say, table
 from alloc.problems.text import counted, number
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Kept:
+class StoredComparison:
     """Outcome of a comparison.
 
     Attributes
@@ -44,62 +44,62 @@ class Kept:
     notes: list[str]
 
 
-def make_missing(keeping: Keeping, plan: Callable[["Store", str], "Comparison"]) -> Kept:
+def make_missing(storage: StoreOptions, plan: Callable[["Store", str], "Comparison"]) -> StoredComparison:
     """Make the runs that are missing in a store, until all are complete or a signal arrives, and return all endings.
 
     Parameters
     ----------
-    keeping : Keeping
+    storage : StoreOptions
     plan : callable
         Returns all runs, given the store and the machine that executes them.
     """
-    from alloc.allocators.experiments.campaign import Campaign, Means
+    from alloc.allocators.experiments.campaign import Campaign, Resources
     from alloc.allocators.experiments.report.files import check_report
     from alloc.allocators.experiments.store.outcome import UNSOLVED
     from alloc.allocators.experiments.store.store import Store
     from alloc.allocators.experiments.stored import doubts
     from alloc.allocators.runtime.interrupts import signals_set
 
-    for file in keeping.reports:
+    for file in storage.reports:
         check_report(file)
     stop = threading.Event()
-    again = UNSOLVED if keeping.retry else ()
-    with _place(keeping) as place, Store(keeping.store, again=again) as store:
+    again = UNSOLVED if storage.retry else ()
+    with _place(storage) as place, Store(storage.store, again=again) as store:
         planned = plan(store, place.machine)
         names = {job.run.key: f"{job.instance.name}, {label}" for (_, label, _), job in planned.jobs.items()}
         progress = _Progress(names)
-        means = Means(keeping.workers, keeping.memory_mb, keeping.kill_after_s)
+        resources = Resources(storage.workers, storage.memory_mb, storage.kill_after_s)
         with signals_set(stop):
-            done = Campaign(store, list(planned.jobs.values()), means, progress.tell, _say_waiting, place).run(stop)
+            done = Campaign(store, list(planned.jobs.values()), resources, progress.tell, _say_waiting, place).run(stop)
         endings = planned.endings(store)
-        notes = [f"{counted(progress.made, 'run')} made; {keeping.store} has {_count(endings)} of {len(planned.jobs)}"]
-        notes += [f"{keeping.store} also contains {other}, which are ignored here" for other in planned.others(store)]
+        notes = [f"{counted(progress.made, 'run')} made; {storage.store} has {_count(endings)} of {len(planned.jobs)}"]
+        notes += [f"{storage.store} also contains {other}, which are ignored here" for other in planned.others(store)]
         notes += doubts(endings)
     if not done:
         notes.insert(0, "interrupted; the same command resumes from here")
-    return Kept(planned, endings, done, notes)
+    return StoredComparison(planned, endings, done, notes)
 
 
-def _place(keeping: Keeping) -> "Place":
+def _place(storage: StoreOptions) -> "Place":
     """Return the place where runs are executed."""
-    if keeping.engine is Engine.RAY:
+    if storage.engine is Engine.RAY:
         from alloc.allocators.experiments.isolation.cluster import Cluster
 
-        return Cluster(keeping.address)
-    from alloc.allocators.experiments.isolation.places import Here
+        return Cluster(storage.address)
+    from alloc.allocators.experiments.isolation.places import ThisMachine
 
-    return Here()
+    return ThisMachine()
 
 
 def compare_in_store(
-    keeping: Keeping,
+    storage: StoreOptions,
     sources: Sequence[str],
     methods: Mapping[str, tuple[str, Mapping[str, object]]],
     seeds: Sequence[int],
     objective: str,
     budget: "Budget",
     threads: int | None,
-) -> "tuple[Kept, list[Row]]":
+) -> "tuple[StoredComparison, list[Row]]":
     """Compare methods, and return the outcome and its rows, with gaps to the best bound of any method."""
     from alloc.allocators.experiments.compare import share_bounds
     from alloc.allocators.experiments.stored import planned, rows_of
@@ -120,29 +120,31 @@ def compare_in_store(
             machine=machine,
         )
 
-    kept = make_missing(keeping, plan)
-    return kept, share_bounds(rows_of(kept.comparison, kept.endings))
+    stored = make_missing(storage, plan)
+    return stored, share_bounds(rows_of(stored.comparison, stored.endings))
 
 
-def conclude(keeping: Keeping, kept: Kept, rows: "list[Row]", *, quiet: bool) -> int:
+def conclude(storage: StoreOptions, stored: StoredComparison, rows: "list[Row]", *, quiet: bool) -> int:
     """Print the differences of methods (unless `quiet`) and the notes, write the reports, and return the exit code."""
     from alloc.allocators.experiments.report.files import write_report
     from alloc.allocators.experiments.report.tables import report_tables
 
-    if not quiet and sum(any(map(any, lists)) for lists in kept.endings.values()) > 1:
-        _tell_differences(kept)
-    for one in kept.notes:
+    if not quiet and sum(any(map(any, lists)) for lists in stored.endings.values()) > 1:
+        _tell_differences(stored)
+    for one in stored.notes:
         note(one)
-    for file in keeping.reports:
-        write_report(file, kept.comparison, kept.endings, partial(report_tables, kept.comparison, kept.endings, rows))
+    for file in storage.reports:
+        write_report(
+            file, stored.comparison, stored.endings, partial(report_tables, stored.comparison, stored.endings, rows)
+        )
     is_served = any(row.runs for row in rows) and not any(row.unserved for row in rows)
-    return 0 if kept.is_complete and is_served else 1
+    return 0 if stored.is_complete and is_served else 1
 
 
-def _tell_differences(kept: Kept) -> None:
+def _tell_differences(stored: StoredComparison) -> None:
     from alloc.allocators.experiments.report.tables import difference_tables
 
-    for found in difference_tables(kept.comparison, kept.endings):
+    for found in difference_tables(stored.comparison, stored.endings):
         say(f"\n{found.title}\n{table(found.header, found.rows)}")
         for one in found.notes:
             note(one)

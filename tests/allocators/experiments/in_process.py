@@ -4,12 +4,12 @@ import json
 import os
 import pickle
 
-from alloc.allocators.experiments.isolation.places import Here
+from alloc.allocators.experiments.isolation.places import ThisMachine
 from alloc.allocators.experiments.isolation.serve import failure, maker
 from alloc.allocators.experiments.store.outcome import Outcome
 
 
-class InProcess(Here):
+class InProcess(ThisMachine):
     def handle(self, cores, threads, *, is_timed):
         return _Direct()
 

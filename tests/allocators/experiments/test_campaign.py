@@ -10,7 +10,7 @@ import pytest
 from in_process import InProcess
 
 from alloc.allocators.auto import PICKED
-from alloc.allocators.experiments.campaign import Campaign, Job, Means
+from alloc.allocators.experiments.campaign import Campaign, Job, Resources
 from alloc.allocators.experiments.isolation import cores, serve
 from alloc.allocators.experiments.store.key import Run, fingerprint, versions
 from alloc.allocators.experiments.store.outcome import Outcome
@@ -50,10 +50,10 @@ def job(method, seed=0, *, time_limit_s=None, instance=INSTANCE):
     return Job(run, {}, instance)
 
 
-def run(folder, jobs, place=None, **means):
+def run(folder, jobs, place=None, **resources):
     """Make runs, and return how each ended, by method."""
     with Store(folder / "runs.db") as store:
-        assert Campaign(store, jobs, Means(**means), place=place).run(threading.Event())
+        assert Campaign(store, jobs, Resources(**resources), place=place).run(threading.Event())
         assert store.leases() == {}
         return {record.run.method: record.ending for record in store.records().values()}
 
@@ -140,7 +140,7 @@ def test_timed_runs_have_processors_of_their_own(plugin, monkeypatch):
         held.free()
 
     with Store(plugin / "runs.db") as store:
-        Campaign(store, [job("pid", time_limit_s=1.0)], Means(workers=1), on_wait=free).run(threading.Event())
+        Campaign(store, [job("pid", time_limit_s=1.0)], Resources(workers=1), on_wait=free).run(threading.Event())
         (record,) = store.records().values()
     assert waited == [True]
     assert (plugin / "naps").read_text().split(maxsplit=1)[1].strip() == f"[{record.ending.cores}]"
@@ -154,7 +154,7 @@ def test_more_timed_runs_than_processors_are_refused(plugin):
     """Timed runs that would share a processor are refused before anything runs."""
     many = len(os.sched_getaffinity(0)) + 1
     with Store(plugin / "runs.db") as store, pytest.raises(InputError, match=r"workers: \d+ timed runs"):
-        Campaign(store, [job("answer", time_limit_s=1.0)], Means(workers=many))
+        Campaign(store, [job("answer", time_limit_s=1.0)], Resources(workers=many))
 
 
 def test_a_campaign_that_is_stopped_gives_its_runs_back(plugin, monkeypatch):
@@ -163,10 +163,10 @@ def test_a_campaign_that_is_stopped_gives_its_runs_back(plugin, monkeypatch):
     stop = threading.Event()
     with Store(plugin / "runs.db") as store:
         jobs = [job("nap", seed) for seed in range(9)]
-        assert not Campaign(store, jobs, Means(workers=1), on_end=lambda run, ending: stop.set()).run(stop)
+        assert not Campaign(store, jobs, Resources(workers=1), on_end=lambda run, ending: stop.set()).run(stop)
         assert len(store.records()) == 1
         assert store.leases() == {}
-        assert Campaign(store, jobs[:2], Means(workers=1), place=InProcess()).run(threading.Event())
+        assert Campaign(store, jobs[:2], Resources(workers=1), place=InProcess()).run(threading.Event())
         assert len(store.records()) == 2
 
 
@@ -180,7 +180,7 @@ def test_a_store_that_fails_leaves_no_process_behind(plugin, monkeypatch):
     with Store(plugin / "runs.db") as store:
         monkeypatch.setattr(Store, "finish", fail)
         with pytest.raises(InputError, match="the disk is full"):
-            Campaign(store, jobs, Means(workers=1)).run(threading.Event())
+            Campaign(store, jobs, Resources(workers=1)).run(threading.Event())
         assert store.leases() == {}
     assert not is_there(int((plugin / "naps").read_text().split()[0]))
 

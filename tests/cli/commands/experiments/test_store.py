@@ -39,7 +39,7 @@ def plugin(tmp_path, monkeypatch):
 @pytest.fixture
 def in_process(monkeypatch):
     """Executes runs in this process."""
-    monkeypatch.setattr(stored, "_place", lambda keeping: InProcess())
+    monkeypatch.setattr(stored, "_place", lambda storage: InProcess())
 
 
 def begun():
