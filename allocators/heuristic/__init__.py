@@ -1,1 +1,1 @@
-"""Heuristic methods: good allocations in little time."""
+"""Heuristic methods, which find good allocations quickly."""

@@ -1,4 +1,4 @@
-"""What a little more time would save: two short searches at the end of a run, whose plans are told and not returned."""
+"""Savings by a little makespan slack, found by two short searches after a run; their plans are mentioned in a note."""
 
 from alloc.allocators.contract.budget import Budget
 from alloc.allocators.contract.search import Search
@@ -8,27 +8,27 @@ from alloc.problems import Evaluation
 from alloc.problems.text import labelled, number, percent
 
 SLACK = 0.001
-"""Share of the makespan that is added."""
+"""Slack as a share of the makespan."""
 
 LEAST_SAVING = 0.01
-"""Share of the energy from which on a saving is told."""
+"""Least saving, as a share of the energy, that is reported."""
 
 TIME_SHARE, MOST_S = 0.02, 0.5
-"""Seconds of each search: a share of the time limit, and at most so many."""
+"""Time of each search, as a share of the time limit, and its maximum in seconds."""
 
 ITERATIONS = 20
-"""Most iterations of each where no time is counted; one for each agent is enough in any case."""
+"""Maximum number of iterations of each search without a time limit; it never exceeds the number of agents."""
 
 
 def note_saving(search: Search) -> None:
-    """Add a note to a run if a thousandth more time clearly saves energy.
+    """Add a note to a run if a slack of a thousandth of the makespan clearly saves energy.
 
-    The saving is against what the same search finds without more time, so that it is the slack's and not the search's.
+    The saving is relative to the plan that the same search finds without slack, so that it is due to the slack alone.
 
     Parameters
     ----------
     search : Search
-        At its end.
+        The run, at its end.
     """
     best = search.best
     if search.interrupted or best is None or best.evaluation.makespan is None or best.evaluation.cost == 0:
@@ -45,7 +45,7 @@ def note_saving(search: Search) -> None:
 
 
 def _within(search: Search, makespan: float) -> Evaluation:
-    """Return the scores of a plan with little energy that takes no longer than so many hours."""
+    """Return the scores of a plan with little energy within a makespan in hours."""
     limit, enough = search.budget.time_limit_s, search.instance.n
     budget = Budget(None, min(ITERATIONS, enough))
     if limit is not None:

@@ -1,1 +1,1 @@
-"""Decentralised methods: agents decide on local communication."""
+"""Decentralised methods, in which agents decide by local communication."""

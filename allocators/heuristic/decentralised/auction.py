@@ -1,4 +1,4 @@
-"""The method `auction`: tasks bid for agents to meet a deadline, and the agents swap afterwards."""
+"""The method `auction`: tasks bid for agents to meet a deadline; afterwards agents swap tasks."""
 
 from typing import ClassVar
 
@@ -22,14 +22,14 @@ from alloc.problems import Allocation, Instance, Objective
 
 
 class Auction(Allocator):
-    """Tasks with a shortfall bid for agents, until all demands for a deadline are met.
+    """An auction in which tasks with a shortfall bid for agents until the demands for a deadline are met.
 
-    Each task has a bidder, say one of its agents; each agent goes to the highest bidder. Prices rise where several
-    tasks want the same agents, as in Bertsekas's auction, but tasks buy ability, not heads: a bid depends on the price
-    per ability that the task lacks. Deadlines move between the lower bound and the earliest one met. When no earlier
-    one can be met, agents move and swap as in the game of `hedonic`, on a complete communication graph. Where energy
-    counts, distances are part of an agent's cost. All this is then repeated with noise on the costs. An iteration is a
-    round of bids.
+    Each task has a bidder, such as one of its agents; each agent goes to the highest bidder. Prices rise if several
+    tasks compete for the same agents, as in Bertsekas's auction, but tasks buy ability instead of agents: a bid depends
+    on the price per unit of missing ability. The deadline is moved between the lower bound and the earliest one met.
+    When no earlier one can be met, agents move and swap as in the game of `hedonic`, on a complete communication graph.
+    If energy counts, distances are part of an agent's cost. All of this is then repeated with noise on the costs. An
+    iteration is a round of bids.
 
     Parameters
     ----------
@@ -44,8 +44,8 @@ class Auction(Allocator):
 
     References
     ----------
-    Bertsekas (1992), doi:10.1007/BF00247653; Choi, Brunet and How (2009), doi:10.1109/TRO.2009.2022423, for agents
-    that agree on the winner without an auctioneer.
+    Bertsekas (1992), doi:10.1007/BF00247653; Choi, Brunet and How (2009), doi:10.1109/TRO.2009.2022423, for consensus
+    on the winner without an auctioneer.
     """
 
     method = BUILT_IN["auction"]
@@ -58,11 +58,11 @@ class Auction(Allocator):
         DeadlineSeries(Search(tiny, Objective.MAKESPAN, Budget(None, 1)), self.parameters).meet(1.0)
 
     def refusal(self, instance: Instance, objective: Objective, budget: Budget) -> str | None:
-        """Refuse more agents than can each store a plan of all, as the game requires."""
+        """Refuse fleets in which each agent cannot store the plan of all agents, as the game requires."""
         return too_many_agents(instance)
 
     def allocate(self, search: Search) -> Proposal:
-        """Hold auctions until the search should stop, and submit every improvement."""
+        """Run auctions until the search should stop, and submit every improvement."""
         instance = search.instance
         if not (instance.workload > 0).any():
             return Proposal(Allocation.idle(instance))

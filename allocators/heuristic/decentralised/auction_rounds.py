@@ -1,4 +1,4 @@
-"""Rounds of an auction in which tasks bid for agents, compiled."""
+"""Compiled rounds of an auction in which tasks bid for agents."""
 
 from typing import NamedTuple
 
@@ -9,14 +9,14 @@ from alloc.allocators.runtime.compiled import compiled
 from alloc.problems.instance import FloatArray, IntArray
 
 TOLERANCE = 1e-12
-"""Relative part of a demand that is forgiven, against rounding errors of sums."""
+"""Relative tolerance on demands, against rounding errors of sums."""
 
 ROUNDS, MESSAGES, SALES = 0, 1, 2
 """Entries of `Market.counts`."""
 
 
 class Market(NamedTuple):
-    """The agents for sale, their costs, prices and owners; the last three fields are changed in place.
+    """Agents with their costs, prices and owners; the last three fields are changed in place.
 
     Attributes
     ----------
@@ -28,7 +28,7 @@ class Market(NamedTuple):
     mask : ndarray of bool, shape (origins, m)
     price : ndarray, shape (n,)
     owner : ndarray of int, shape (n,)
-        Task that has bought each agent, or -1.
+        Task that owns each agent, or -1.
     counts : ndarray of int, shape (3,)
         Rounds, messages and sales so far.
     """
@@ -44,11 +44,11 @@ class Market(NamedTuple):
 
 @compiled
 def run_rounds(rounds: int, demand: FloatArray, market: Market, increment: float) -> bool:
-    """Hold up to `rounds` rounds; return whether the demand of every task is met.
+    """Run up to `rounds` rounds; return whether the demand of every task is met.
 
-    In a round each task with a shortfall bids for the agent of least cost and price per ability that it lacks: as much
-    as makes it as expensive as the second cheapest, and an increment. The agent goes to the highest bidder. Agents that
-    a task does not need are released, and their price falls to 0.
+    In a round, each task with a shortfall bids for the agent with the least sum of cost and price per unit of missing
+    ability. The bid raises the price to where the agent is as expensive as the second cheapest, plus an increment. The
+    agent goes to the highest bidder. Agents that a task does not need are released, and their price becomes 0.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ def run_rounds(rounds: int, demand: FloatArray, market: Market, increment: float
 
     References
     ----------
-    Bertsekas (1992), doi:10.1007/BF00247653; there each bidder wants one object.
+    Bertsekas (1992), doi:10.1007/BF00247653, in which each bidder wants one object.
     """
     n, m = len(market.price), len(demand)
     group_ability = np.zeros(m)
@@ -94,7 +94,7 @@ def run_rounds(rounds: int, demand: FloatArray, market: Market, increment: float
 def collect_bids(
     demand: FloatArray, group_ability: FloatArray, offer: FloatArray, bidder: IntArray, market: Market, increment: float
 ) -> bool:
-    """Write the highest bid for each agent and its bidder (-1: none); return whether any task has a shortfall."""
+    """Write the highest bid for each agent and its bidder (-1 for none); return whether any task has a shortfall."""
     any_short = False
     bidder[:] = -1
     for j in range(len(demand)):
@@ -110,7 +110,7 @@ def collect_bids(
 
 @compiled
 def choose_agent(j: int, shortfall: float, market: Market, increment: float) -> tuple[int, float]:
-    """Return the agent that task `j` bids for, and the bid; -1 if there is none."""
+    """Return the agent that task `j` bids for, -1 for none, and the bid."""
     best, second, agent = np.inf, np.inf, -1
     for i in range(len(market.price)):
         row = market.origin[i]

@@ -1,4 +1,4 @@
-"""Coalition-formation games, one after the other, each from the best partition so far with a few groups dissolved."""
+"""A sequence of coalition-formation games, each from the best partition so far with a few groups dissolved."""
 
 from dataclasses import dataclass
 
@@ -15,13 +15,13 @@ from alloc.problems.evaluation import last_equal
 from alloc.problems.instance import FloatArray, IntArray
 
 MOST_CELLS = 30_000_000
-"""Largest number of agents times agents and tasks: each agent stores a plan of all."""
+"""Largest value of n (n + m), as each of the n agents stores the plan of all agents."""
 
 EVALUATIONS_PER_SLICE = 500_000
-"""Evaluations of a task, neighbour or partner between two checks of the clock: some 2 ms."""
+"""Evaluations of a task, neighbour or partner between two checks of the clock: about 2 ms."""
 
 TIE_BREAKING_NOISE = 1e-3
-"""Noise on the stamps of the first game: decides between equals, and makes all stamps differ."""
+"""Noise on the stamps of the first game, which breaks ties and makes all stamps different."""
 
 
 @dataclass(frozen=True)
@@ -33,14 +33,14 @@ class HedonicParameters(CheckedParameters):
     communication_radius : float or None
         Distance up to which agents communicate; None for the communication ranges of the instance.
     partners : int
-        Neighbours to which an agent may propose a swap, drawn at random where it has more.
+        Number of neighbours to which an agent may propose a swap, drawn at random if it has more.
     distance_weight : float
-        Weight of the mean distance, relative to the whole shortfall of an unserved task, where energy counts or the
+        Weight of the mean distance, relative to the shortfall of an unserved task, if energy counts or the
         communication graph is disconnected.
     stamp_noise : float
         Noise on the precedence of agents, from the second game on.
     most_dissolved : int
-        Most groups that are dissolved before the next game; at least two are.
+        From 2 to ``most_dissolved + 1`` groups are dissolved before the next game.
     """
 
     communication_radius: float | None = bounded(None, low=0, infinite=True)
@@ -51,19 +51,19 @@ class HedonicParameters(CheckedParameters):
 
 
 def too_many_agents(instance: Instance) -> str | None:
-    """Return why each agent cannot store a plan of all, None if it can."""
+    """Return why each agent cannot store the plan of all agents, None if it can."""
     if instance.n * (instance.n + instance.m) > MOST_CELLS:
-        return f"each of {instance.n} agents would keep a plan of all; some {int(MOST_CELLS**0.5)} are the most"
+        return f"each of {instance.n} agents would store the plan of all; at most about {int(MOST_CELLS**0.5)} can"
     return None
 
 
 class CoalitionGame:
-    """All agents with their beliefs; plays games one after the other.
+    """The agents with their beliefs, which play one game after another.
 
     Parameters
     ----------
     search : Search
-        Of an instance in which some task has workload.
+        A run on an instance with at least one task that has workload.
     graph : CommunicationGraph
     parameters : HedonicParameters
 
@@ -71,7 +71,7 @@ class CoalitionGame:
     ----------
     beliefs : Beliefs
     games : int
-        Games played so far.
+        Number of games played so far.
     """
 
     def __init__(self, search: Search, graph: CommunicationGraph, parameters: HedonicParameters) -> None:
@@ -89,7 +89,7 @@ class CoalitionGame:
         self.games = 0
 
     def begin(self, allocation: Allocation) -> None:
-        """Let every agent believe what `allocation` says of its component, and that all others are idle."""
+        """Set the beliefs of every agent to `allocation` for its own component, with all other agents idle."""
         instance, beliefs, task = self.search.instance, self.beliefs, allocation.task_of_agent
         task = np.where(instance.workload[task] > 0, task, IDLE)  # a task without workload needs no agent
         for number in range(self.graph.n_components):
@@ -103,7 +103,7 @@ class CoalitionGame:
         beliefs.is_content[:], beliefs.is_news[:] = False, False
 
     def run(self, stamp_noise: float = TIE_BREAKING_NOISE) -> bool:
-        """Play until no agent wants a change, and submit the result; return whether that point was reached."""
+        """Play until no agent wants a change, and submit the result; return whether a stable partition was reached."""
         self.games += 1
         stable = self._play(self.target, False, stamp_noise)
         score, limit = self.search.submit(self.allocation), self.search.makespan_limit
@@ -117,7 +117,7 @@ class CoalitionGame:
         return stable
 
     def perturb(self) -> None:
-        """Return to the best partition, and dissolve a few groups: neighbouring ones where energy counts, else any."""
+        """Return to the best partition, and dissolve a few groups: neighbouring ones if energy counts, else any."""
         instance, rng, best = self.search.instance, self.rng, self.search.best
         assert best is not None
         order = rng.random(instance.m)
@@ -133,12 +133,12 @@ class CoalitionGame:
 
     @property
     def allocation(self) -> Allocation:
-        """Every agent on the task that it believes to have."""
+        """The allocation in which every agent has the task that it believes it has."""
         version = self.beliefs.version
         return Allocation(self.beliefs.plans[version, np.arange(len(version))].astype(np.intp))
 
     def _play(self, target: FloatArray, saving: bool, stamp_noise: float) -> bool:
-        """Play in slices; return whether the game came to its end."""
+        """Play in slices; return whether the game ended."""
         search, data, counts = self.search, self.data, self.beliefs.counts
         noise = self.rng.random(max(4096, 2 * search.instance.n))
         evaluations = search.instance.n * (search.instance.m + 8) + len(data.partner) + len(data.neighbour)
@@ -185,7 +185,7 @@ def _empty_beliefs(n: int, m: int) -> Beliefs:
 
 
 def _draw_partners(graph: CommunicationGraph, most: int, rng: np.random.Generator) -> tuple[IntArray, IntArray]:
-    """Draw up to `most` neighbours of each agent; return where those of each begin, and all of them."""
+    """Draw up to `most` neighbours of each agent; return the index where those of each begin, and all of them."""
     n = len(graph.component)
     drawn = [_sample(n - 1 if graph.is_complete else int(graph.degree[i]), most, rng) for i in range(n)]
     for i, chosen in enumerate(drawn):
@@ -199,7 +199,7 @@ def _sample(count: int, most: int, rng: np.random.Generator) -> IntArray:
 
 
 def compile_game() -> None:
-    """Compile the loops of the game, or read them from their cache, before a clock runs."""
+    """Compile the loops of the game, or load them from the cache, before the clock starts."""
     instance = Instance(ability=[1, 2], workload=[2, 1])
     search = Search(instance, Objective.MAKESPAN, Budget(None, 1))
     game = CoalitionGame(search, communication_graph(instance), HedonicParameters())

@@ -16,11 +16,11 @@ class CommunicationGraph:
     Attributes
     ----------
     begin : ndarray of int, shape (n + 1,)
-        Where the neighbours of each agent begin in `neighbour`.
+        Index in `neighbour` where the neighbours of each agent begin.
     neighbour : ndarray of int, shape (edges,)
-        Neighbours of the agents, one agent after the other; empty where the graph is complete.
+        Concatenated neighbours of all agents; empty if the graph is complete.
     component : ndarray of int, shape (n,)
-        Connected component of each agent; no message passes between components.
+        Connected component of each agent; there are no messages between components.
     is_complete : bool
         Whether all agents are neighbours of each other.
     """
@@ -45,13 +45,13 @@ class CommunicationGraph:
 def communication_graph(instance: Instance, radius: float | None = None) -> CommunicationGraph:
     """Return the graph of agents within each other's communication range at the start.
 
-    An agent at an unknown location is a neighbour of all, as distances to it count as 0 elsewhere, too.
+    An agent at an unknown position is a neighbour of all, as distances to it count as 0 elsewhere as well.
 
     Parameters
     ----------
     instance : Instance
     radius : float, optional
-        One range for all agents, in units of distance, instead of those of the instance.
+        Range of all agents, in units of distance, in place of those of the instance.
     """
     from scipy.sparse import csr_array
     from scipy.sparse.csgraph import connected_components
@@ -73,7 +73,7 @@ def communication_graph(instance: Instance, radius: float | None = None) -> Comm
 
 
 def _within_range(position: FloatArray, reach: FloatArray, known: IntArray) -> IntArray:
-    """Return the pairs within each other's range, shape (pairs, 2)."""
+    """Return the pairs of agents within each other's range, shape (pairs, 2)."""
     from scipy.spatial import KDTree
 
     longest = min(float(reach[known].max()), _diagonal(position[known])) + TOLERANCE
@@ -92,5 +92,5 @@ def _pairs_with(agents: IntArray, n: int) -> IntArray:
 
 
 def _diagonal(position: FloatArray) -> float:
-    """Return the diagonal of the bounding box, which no two agents exceed."""
+    """Return the diagonal of the bounding box, an upper bound on the distance between two agents."""
     return float(np.linalg.norm(np.ptp(position, axis=0)))

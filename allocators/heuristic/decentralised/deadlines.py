@@ -1,4 +1,4 @@
-"""A series of auctions: the deadline is moved between the lower bound and the best makespan met."""
+"""A series of auctions, whose deadline is moved between the lower bound and the best makespan met."""
 
 from dataclasses import dataclass
 
@@ -11,10 +11,10 @@ from alloc.problems import Allocation, Objective
 from alloc.problems.instance import FloatArray
 
 EVALUATIONS_PER_SLICE = 2_000_000
-"""Evaluations of an agent by a task between two checks of the clock; a few milliseconds."""
+"""Evaluations of an agent by a task between two checks of the clock: a few milliseconds."""
 
 CLOSE = 1e-6
-"""Relative excess over the lower bound at which a deadline is early enough."""
+"""Relative excess over the lower bound up to which no earlier deadline is tried."""
 
 
 @dataclass(frozen=True)
@@ -26,12 +26,12 @@ class AuctionParameters(CheckedParameters):
     patience : int
         Rounds per task after which a deadline counts as too early.
     first_excess : float
-        First deadline: relative excess over the lower bound.
+        Relative excess of the first deadline over the lower bound.
     deadlines : int
-        Deadlines that are tried: half as far from the bound as the best that was met, or later than one that was
-        missed.
+        Number of deadlines that are tried: each is half as far from the bound as the best one met, or later than one
+        that was missed.
     increment : float
-        Least increase of a price, in units of the mean distance, or of the price of a mean agent.
+        Least increase of a price, in units of the mean distance, or of the price of an average agent.
     cost_noise : float
         Largest noise on costs, in the same unit, from the second series on.
     """
@@ -44,20 +44,20 @@ class AuctionParameters(CheckedParameters):
 
 
 class DeadlineSeries:
-    """Auctions of all agents, one for each deadline.
+    """A series of auctions of all agents, one for each deadline.
 
     Parameters
     ----------
     search : Search
-        Of an instance in which some task has workload.
+        A run on an instance with at least one task that has workload.
     parameters : AuctionParameters
 
     Attributes
     ----------
     best : Allocation
-        That of the earliest deadline met in the last series, or the last one if none was met.
+        Allocation for the earliest deadline met in the last series, or the last allocation if none was met.
     count : int
-        Series so far.
+        Number of series so far.
     """
 
     def __init__(self, search: Search, parameters: AuctionParameters) -> None:
@@ -84,7 +84,7 @@ class DeadlineSeries:
         self.market.cost[:] = self.cost + self.parameters.cost_noise * self.rng.random(self.cost.shape)
 
     def run(self) -> None:
-        """Try deadlines, and keep the best allocation that meets one, or the last one if none is met."""
+        """Try deadlines, and keep the best allocation that meets one, or the last allocation if none is met."""
         self.count += 1
         bound = max(self.search.lower_bound, np.finfo(float).tiny)
         excess, met = self.parameters.first_excess, np.inf
@@ -104,7 +104,7 @@ class DeadlineSeries:
                 break
 
     def meet(self, deadline: float) -> bool:
-        """Hold an auction for a deadline in hours; return whether the demand of every task was met."""
+        """Run an auction for a deadline in hours; return whether the demand of every task was met."""
         search, market, parameters = self.search, self.market, self.parameters
         instance = search.instance
         market.owner[:], market.price[:] = -1, 0.0

@@ -1,4 +1,4 @@
-"""Rounds of the coalition-formation game, compiled: decide on one's beliefs, tell the neighbours, adopt the newest."""
+"""Compiled rounds of the coalition-formation game: agents decide, communicate, and adopt the newest partition."""
 
 from typing import NamedTuple
 
@@ -20,28 +20,28 @@ ROUNDS, MESSAGES, DECISIONS = 0, 1, 2
 
 
 class Beliefs(NamedTuple):
-    """What each agent believes the partition to be; changed in place.
+    """The partition that each agent believes in; changed in place.
 
-    A *version* is a partition that some agent believes in.
+    A *version* is a partition that at least one agent believes in.
 
     Attributes
     ----------
     version : ndarray of int, shape (n,)
         Version of each agent.
     n_changes : ndarray of int, shape (n,)
-        How often that version was changed.
+        Number of changes of that version.
     stamp : ndarray, shape (n,)
-        Decides between versions with equally many changes.
+        Precedence among versions with equal numbers of changes.
     is_content : ndarray of bool, shape (n,)
-        Whether the agent has evaluated its version and stays where it is.
+        Whether the agent has evaluated its version and wants no change.
     is_news : ndarray of bool, shape (n,)
-        Whether the version is new to the neighbours.
+        Whether the version has not been sent to the neighbours yet.
     plans : ndarray of int, shape (2 n, n)
         Task of each agent in each version, -1 for none.
     coverages : ndarray, shape (2 n, m)
         W / h of each task in each version.
     counts : ndarray of int, shape (3,)
-        Rounds, messages and decisions so far.
+        Numbers of rounds, messages and decisions so far.
     """
 
     version: IntArray
@@ -65,7 +65,7 @@ def play(
     stamp_noise: float,
     noise: FloatArray,
 ) -> bool:
-    """Play up to `rounds` rounds; return whether the game is over: no agent wants a change, and there is no news.
+    """Play up to `rounds` rounds; return whether the game is over: no agent wants a change or has news to send.
 
     Parameters
     ----------
@@ -73,15 +73,15 @@ def play(
     game : GameData
     beliefs : Beliefs
     target : ndarray, shape (n,)
-        Coverage W / h beyond which no task needs more, as each agent sees it.
+        Coverage W / h that each agent regards as sufficient for a task.
     saving : bool
-        Whether agents save distance without bringing a task below `target`, rather than reduce shortfalls.
+        Whether agents save distance while keeping tasks at `target`, in place of reducing shortfalls.
     distance_weight : float
-        Weight of a unit of distance, relative to the whole shortfall of an unserved task.
+        Weight of a unit of distance, relative to the shortfall of an unserved task.
     stamp_noise : float
         Weight of the noise on stamps.
     noise : ndarray, shape (p,)
-        Random numbers from 0 to 1, used cyclically.
+        Random numbers between 0 and 1, used cyclically.
 
     References
     ----------
@@ -116,7 +116,7 @@ def play(
 
 @compiled
 def communicate(game: GameData, beliefs: Beliefs) -> IntArray:
-    """Send all news to the neighbours; return the agent whose version each adopts: most changes, then highest stamp."""
+    """Send all news; return whose version each agent adopts: that with the most changes, then the highest stamp."""
     n, n_changes, stamp = len(beliefs.version), beliefs.n_changes, beliefs.stamp
     winner = np.empty(n, np.int64)
     overall = 0
@@ -148,7 +148,7 @@ def is_newer(one: int, other: int, n_changes: IntArray, stamp: FloatArray) -> bo
 
 @compiled
 def adopt(winner: IntArray, wants: BoolArray, goal: IntArray, mate: IntArray, game: GameData, beliefs: Beliefs) -> bool:
-    """Write the winning versions, and give each agent that which won there; return whether none is news."""
+    """Write the winning versions and assign each agent the version that it adopts; return whether there is no news."""
     n, version = len(winner), beliefs.version
     used, slot, free = np.zeros(len(beliefs.plans), np.bool_), np.full(n, -1), 0
     for i in range(n):

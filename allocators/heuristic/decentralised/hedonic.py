@@ -1,4 +1,4 @@
-"""The method `hedonic`: a decentralised coalition-formation game on local communication."""
+"""The method `hedonic`: a decentralised coalition-formation game with local communication."""
 
 from typing import ClassVar
 
@@ -22,18 +22,18 @@ class Hedonic(Allocator):
     """GRAPE with abilities in place of head counts, swaps, and further games from the best partition so far.
 
     Each agent knows the tasks and the abilities in its component of the communication graph, and believes in one
-    partition of its agents into coalitions. In a round, which is an iteration, it joins the coalition of highest
-    utility, or proposes a swap to a neighbour where both tasks together gain by it; it sends the partition, the number
-    of its changes and a stamp to its neighbours, and adopts the version with most changes among those that it receives.
-    The utility of a move is what the tasks gain, so that their total shortfall is a potential of the game, which ends
-    in a partition that no agent wants to leave alone or by a swap (Nash-stable). Where energy counts, a second game
+    partition of the component's agents into coalitions. In a round, which is an iteration, it joins the coalition of
+    highest utility, or proposes a swap to a neighbour if both tasks together gain from it; it sends the partition, its
+    number of changes and a stamp to its neighbours, and adopts the version with the most changes that it receives. The
+    utility of a move is the gain of the tasks, so that their total shortfall is a potential of the game, which ends in
+    a Nash-stable partition: no agent wants to leave its coalition, alone or by a swap. If energy counts, a second game
     follows in which agents leave, move or swap to save distance without lowering the coverage of a task.
 
-    Differences from the paper: utilities depend on abilities, not on head counts; stamps are not purely random, but
-    give precedence to able agents; swaps; and further games, in which a few groups are dissolved, and the old partition
-    is kept unless the new one is better. Agents of different components cannot agree: each component divides its own
-    ability among all tasks, and a note says so. The end of a game is detected centrally; messages that would tell the
-    agents are not counted.
+    Differences from the paper: utilities depend on abilities instead of head counts; stamps are not purely random, but
+    give precedence to agents of high ability; agents swap; and there are further games, in which a few groups are
+    dissolved, and the old partition is kept unless the new one is better. Agents of different components cannot agree:
+    each component divides its own ability among all tasks, and a note says so. The end of a game is detected centrally;
+    messages that would inform the agents of it are not counted.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ class Hedonic(Allocator):
         compile_game()
 
     def refusal(self, instance: Instance, objective: Objective, budget: Budget) -> str | None:
-        """Refuse more agents than can each store a plan of all."""
+        """Refuse fleets in which each agent cannot store the plan of all agents."""
         return too_many_agents(instance)
 
     def allocate(self, search: Search) -> Proposal:
@@ -74,7 +74,7 @@ class Hedonic(Allocator):
         stable = game.run()
         notes = [_report(game, "the first game" if stable else "the game, cut short,")]
         if graph.n_components > 1:
-            notes.append(f"the communication graph has {graph.n_components} components; each played a game of its own")
+            notes.append(f"the communication graph has {graph.n_components} components; each played its own game")
         while not search.should_stop():
             game.perturb()
             game.run(self.parameters.stamp_noise)

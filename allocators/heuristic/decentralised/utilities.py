@@ -1,4 +1,4 @@
-"""Decisions of an agent in the coalition-formation game: the move or swap of highest utility; compiled.
+"""Compiled decisions of an agent in the coalition-formation game: the move or swap of highest utility.
 
 The coverage of a task is its group ability divided by its workload, W / h.
 """
@@ -12,28 +12,28 @@ from alloc.allocators.runtime.compiled import compiled
 from alloc.problems.instance import FloatArray, IntArray
 
 EPS = 1e-9
-"""Improvement below which an agent stays where it is."""
+"""Improvement below which an agent does not change."""
 
 ROUNDING = 1e-12
-"""Relative amount by which the coverage of a task may miss its floor."""
+"""Relative tolerance on the least coverage of a task."""
 
 JOIN_PRECEDENCE = 2.0
-"""Precedence of an idle agent that joins, above that of all other changes, whose gain is at most 1."""
+"""Precedence of an idle agent that joins a coalition, above all other changes, whose gain is at most 1."""
 
 STAY = -2
-"""In place of a task: no change."""
+"""Value in place of a task that stands for no change."""
 
 BoolArray = NDArray[np.bool_]
 
 
 class GameData(NamedTuple):
-    """The constant data of a game, which all agents know.
+    """The constant data of a game, known to all agents.
 
     Attributes
     ----------
     ability : ndarray, shape (n,)
     origin : ndarray of int, shape (n,)
-        Row of each agent in `cost` and `mask`, which are those of `Reach`.
+        Row of each agent in `cost` and `mask`, which are taken from `Reach`.
     cost : ndarray, shape (origins, m)
     mask : ndarray of bool, shape (origins, m)
     workload : ndarray, shape (m,)
@@ -59,7 +59,7 @@ class GameData(NamedTuple):
 
 @compiled
 def shortfall(coverage: float, target: float) -> float:
-    """Return the squared relative shortfall of a task, from 0 to 1; convex, so that the worst-served counts most."""
+    """Return the squared relative shortfall of a task, from 0 to 1; convex, so that the worst-served count most."""
     missing = max(0.0, 1.0 - coverage / target)
     return missing * missing
 
@@ -68,9 +68,9 @@ def shortfall(coverage: float, target: float) -> float:
 def best_serving_change(
     i: int, plan: NDArray[np.int32], coverage: FloatArray, game: GameData, target: float, distance_weight: float
 ) -> tuple[int, int, float]:
-    """Return the task that agent `i` prefers, the agent that it would swap with (-1: none), and the precedence.
+    """Return the task that agent `i` prefers, the agent to swap with (-1 for none), and the precedence.
 
-    Its utility is the decrease of the tasks' shortfall, whose sum is thereby a potential of the game, minus the
+    The utility is the decrease of the tasks' total shortfall, which is thereby a potential of the game, minus the
     weighted increase of the cost of flights.
     """
     w, row, home = game.ability[i], game.origin[i], int(plan[i])
@@ -114,9 +114,9 @@ def best_serving_change(
 def best_saving_change(
     i: int, plan: NDArray[np.int32], coverage: FloatArray, game: GameData, target: float
 ) -> tuple[int, int, float]:
-    """Return the change that saves most cost, as `best_serving_change` does.
+    """Return the change that saves the most cost, in the format of `best_serving_change`.
 
-    No task may fall below the coverage `target`, or below its present one where that is lower.
+    No task may fall below the coverage `target`, or below its present coverage if that is lower.
     """
     w, row, home = game.ability[i], game.origin[i], int(plan[i])
     workload, mask, cost = game.workload, game.mask, game.cost

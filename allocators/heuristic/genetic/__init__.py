@@ -1,1 +1,1 @@
-"""A genetic algorithm over assignments, on DEAP."""
+"""A genetic algorithm over assignments, based on DEAP."""

@@ -16,19 +16,19 @@ from alloc.allocators.heuristic.greedy.list_schedule import greedy
 from alloc.problems import Allocation, Instance, Objective, serve_all
 
 MOST_AGENTS = 200_000
-"""Agents beyond which a generation takes longer than a run may exceed its time limit."""
+"""Number of agents above which a generation takes longer than a run may exceed its time limit."""
 
 MOST_PAIRS = 20_000_000
-"""Pairs of starting place and task beyond which the table of distances takes longer than that."""
+"""Number of pairs of origin and task above which the table of distances takes longer than that."""
 
 
 class GeneticAlgorithm(Allocator):
-    """Evolve assignments by selection, crossover of groups and mutation by exchange, without local search.
+    """A genetic algorithm with crossover of groups and mutation by exchanges, without local search.
 
-    Elitist without duplicates, and restarted around the best upon stagnation, as in CHC (Eshelman 1991,
-    doi:10.1016/B978-0-08-050684-5.50020-3); each epoch has another target makespan between the lower bound and the
-    best. An iteration is a generation. Populations begin with list schedules, that of `greedy` among them. Each thread
-    has a population of its own, and these exchange their best; see `evolve_islands`.
+    The population is elitist and free of duplicates, and is restarted around the best individual upon stagnation, as
+    in CHC (Eshelman 1991, doi:10.1016/B978-0-08-050684-5.50020-3); each epoch has a different target makespan between
+    the lower bound and the best. An iteration is a generation. Initial populations are list schedules, including that
+    of `greedy`. Each thread has its own population, and these exchange their best individuals; see `evolve_islands`.
 
     Parameters
     ----------
@@ -53,13 +53,13 @@ class GeneticAlgorithm(Allocator):
         self.parameters = with_settings(GeneticParameters, parameters, settings)
 
     def refusal(self, instance: Instance, objective: Objective, budget: Budget) -> str | None:
-        """Refuse instances of which a single generation would take most of a usual time limit."""
+        """Refuse instances for which a single generation would take most of a usual time limit."""
         if instance.n > MOST_AGENTS:
-            return f"it takes {MOST_AGENTS} agents, this has {instance.n}; use greedy"
+            return f"it handles at most {MOST_AGENTS} agents, not {instance.n}; use greedy"
         pairs = instance.reach.pairs
         by_place = objective is Objective.MAKESPAN_ENERGY or not instance.reach.is_complete
         if by_place and pairs > MOST_PAIRS:
-            return f"it takes {MOST_PAIRS} pairs of starting place and task, this has {pairs}; use greedy"
+            return f"it handles at most {MOST_PAIRS} pairs of starting place and task, not {pairs}; use greedy"
         return None
 
     def allocate(self, search: Search) -> Proposal:
@@ -69,7 +69,7 @@ class GeneticAlgorithm(Allocator):
             return Proposal(Allocation.idle(instance))
         search.submit(serve_all(instance, greedy(instance, search)))
         assert search.best is not None
-        if search.best.evaluation.served_makespan == 0:  # no task that takes time can be served
+        if search.best.evaluation.served_makespan == 0:  # no task with workload can be served
             return Proposal(Allocation.idle(instance))
         encoding = Encoding(instance)
         if search.threads > 1:

@@ -1,4 +1,4 @@
-"""Coalitions of two groups that mutation may exchange, and what each exchange costs."""
+"""Coalitions of two groups that mutation may exchange, and the costs of the exchanges."""
 
 from dataclasses import dataclass
 
@@ -10,7 +10,7 @@ from alloc.problems.instance import FloatArray, IntArray
 
 @dataclass(frozen=True, eq=False)
 class TwoColumns:
-    """Two columns in each of some rows, between which agents are exchanged; each of shape (k,)."""
+    """Rows, and two columns in each between which agents are exchanged; all of shape (k,)."""
 
     row: IntArray
     source: IntArray
@@ -52,10 +52,10 @@ def exchange_cost(
     noise: float,
     distance_weight: float | None,
 ) -> FloatArray:
-    """Return the cost of each exchange, ``inf`` where it is impossible, shape (k, givers, takers).
+    """Return the cost of each exchange, ``inf`` if it is impossible, shape (k, givers, takers).
 
-    It is the shortfall that both tasks then have, relative to their demands, plus exponential noise of scale `noise` at
-    most, plus the weighted distance unless `distance_weight` is None.
+    The cost is the resulting shortfall of both tasks, relative to their demands, plus exponential noise of a scale up
+    to `noise`, plus the weighted distance unless `distance_weight` is None.
     """
     rows, ability = len(givers), encoding.ability
     moved = ability[givers].sum(axis=2)[:, :, None] - ability[takers].sum(axis=2)[:, None, :]
@@ -70,7 +70,7 @@ def exchange_cost(
 
 
 def _shortfall(moved: FloatArray, group: FloatArray, demand: FloatArray, columns: TwoColumns) -> FloatArray:
-    """Return the shortfall of both tasks after `moved` has changed groups, relative to their demands."""
+    """Return the shortfall of both tasks, relative to their demands, after the ability `moved` has changed groups."""
     shortfall: FloatArray = np.zeros(moved.shape)
     mean = demand[:-1].mean()
     for column, sign in ((columns.source, -1.0), (columns.target, 1.0)):

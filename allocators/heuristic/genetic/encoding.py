@@ -1,4 +1,4 @@
-"""A population of allocations as one matrix, and the objectives of all its rows at once."""
+"""A population of allocations as a matrix, and the objectives of all its rows at once."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -15,23 +15,23 @@ Genes = NDArray[np.int32]
 BoolArray = NDArray[np.bool_]
 
 ROUNDING = 1e-9
-"""Relative shortfall of a task that counts as none."""
+"""Relative shortfall of a task up to which it counts as 0."""
 
 
 @dataclass(frozen=True, eq=False)
 class Objectives:
-    """What the rows of a population achieve; each of shape (rows,) but the last.
+    """Objectives of the rows of a population; all of shape (rows,) except the last.
 
     Attributes
     ----------
     unserved : ndarray
-        Tasks with workload and without an agent.
+        Number of tasks with workload and without an agent.
     shortfall : ndarray
         Sum over the tasks of max(0, 1 - W_j T / h_j), at the target makespan T.
     makespan : ndarray
-        Over the served tasks, in hours.
+        Makespan of the served tasks, in hours.
     energy : ndarray
-        0 where it is not asked for.
+        0 if it is not required.
     group_ability : ndarray, shape (rows, c)
         W of each task.
     """
@@ -44,10 +44,10 @@ class Objectives:
 
 
 class Encoding:
-    """Allocations of one instance as rows of genes; read-only.
+    """Encoding of allocations of an instance as rows of genes; read-only.
 
-    Only tasks with workload have a column. Idle agents have one more column, at everyone's start and without demand, so
-    that all its ability is surplus.
+    Only tasks with workload have a column. One more column stands for idle agents; it is at every agent's start and has
+    no demand, so that all its ability is surplus.
 
     Attributes
     ----------
@@ -58,7 +58,7 @@ class Encoding:
     ability : ndarray, shape (n + 1,)
         Work per hour of the agents, and 0 for `no_agent`.
     no_agent : int
-        The number n of an agent that does not exist, which makes a move out of a swap.
+        The index n of a dummy agent, with which a swap becomes a move.
     workload : ndarray, shape (c,)
         Workloads of `tasks`, all positive.
     """
@@ -76,11 +76,11 @@ class Encoding:
 
     @cached_property
     def mean_cost(self) -> float:
-        """Mean cost of flights from the agents' starts to tasks; 1 where all are 0."""
+        """Mean cost of flights from the agents' starts to tasks; 1 if all are 0."""
         return float(self.reach.cost.mean()) or 1.0
 
     def group_abilities(self, genes: Genes) -> FloatArray:
-        """Return W of each column, that of idle agents included, shape (rows, c + 1)."""
+        """Return W of each column, including that of idle agents, shape (rows, c + 1)."""
         rows, width = len(genes), self.idle + 1
         cell = genes + (np.arange(rows) * width)[:, None]
         weights = np.broadcast_to(self.ability[:-1], genes.shape)
@@ -93,7 +93,7 @@ class Encoding:
             return np.clip(self.workload / makespan, np.finfo(float).tiny, np.finfo(float).max)
 
     def objectives(self, genes: Genes, target_makespan: float, with_energy: bool = True) -> Objectives:
-        """Return what each row achieves; the shortfall is that at `target_makespan`, in hours."""
+        """Return the objectives of each row; the shortfall refers to `target_makespan`, in hours."""
         group = self.group_abilities(genes)[:, :-1]
         served = group > 0
         with np.errstate(divide="ignore", over="ignore"):
@@ -111,7 +111,7 @@ class Encoding:
         )
 
     def allows(self, agent: IntArray, column: NDArray[np.integer]) -> BoolArray:
-        """Whether each agent can take the column at the same index; `no_agent` can take any, and all can be idle."""
+        """Return whether each agent can take the column at its index; `no_agent` can take any, and all can be idle."""
         if self.is_complete:
             return np.ones(np.broadcast_shapes(agent.shape, column.shape), dtype=bool)
         reachable = self.reach.mask[self._origin[agent], self._task[column]]
@@ -119,7 +119,7 @@ class Encoding:
         return allowed
 
     def cost(self, agent: IntArray, column: NDArray[np.integer]) -> FloatArray:
-        """Cost of each agent's flight to the column at the same index; 0 for `no_agent` and idle agents."""
+        """Return the cost of each agent's flight to the column at its index; 0 for `no_agent` and idle agents."""
         cost = self.reach.cost[self._origin[agent], self._task[column]]
         return np.where((agent == self.no_agent) | (column == self.idle), 0.0, cost)
 

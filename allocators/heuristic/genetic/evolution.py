@@ -1,4 +1,4 @@
-"""One epoch of the genetic algorithm, on DEAP's toolbox: a population evolves towards one target makespan."""
+"""One epoch of the genetic algorithm, with DEAP's toolbox: a population evolves towards one target makespan."""
 
 import math
 from dataclasses import dataclass
@@ -18,25 +18,24 @@ from alloc.problems.instance import FloatArray
 
 @dataclass(frozen=True)
 class GeneticParameters(CheckedParameters):
-    """Parameters of the genetic algorithm, tuned on the paper's scenarios and on hard ones of 2 to 4 agents a task.
+    """Parameters of the genetic algorithm, tuned on the paper's scenarios and on hard ones of 2 to 4 agents per task.
 
     Attributes
     ----------
     population : int or None
-        Individuals; None for as many as `population_genes` allows, from `smallest` to `largest`.
+        Number of individuals; None for as many as `population_genes` allows, between `smallest` and `largest`.
     population_genes : int
-        Genes and tasks in a whole population, which keeps a generation below a tenth of a second.
+        Total number of genes and tasks in a population, which keeps a generation below a tenth of a second.
     smallest, largest : int
-        Limits on the population where `population` is None.
+        Limits on the number of individuals if `population` is None.
     crossover : float
         Probability that a child has two parents.
     crossover_share : float
         Largest share of the groups that a child takes from the second parent.
     patience : int
-        Generations without a better individual after which a new epoch begins.
+        Number of generations without a better individual after which a new epoch begins.
     initial_noise, initial_distance_weight : float
-        Largest noise on abilities, and largest weight of the mean distance, in the list schedules that a population
-        begins with.
+        Largest noise on abilities, and largest weight of the mean distance, in the initial list schedules.
     """
 
     population: int | None = bounded(None, low=4)
@@ -57,17 +56,17 @@ class GeneticParameters(CheckedParameters):
 
 
 class Fitness(base.Fitness):  # type: ignore[misc]
-    """Fewest unserved tasks, least shortfall at the target makespan, least makespan, least energy: in this order.
+    """Lexicographic fitness: unserved tasks, shortfall at the target makespan, makespan, and energy.
 
-    The shortfall measures how far all tasks together are from the target, where the makespan depends on the worst
-    alone. Individuals that meet the target are compared as the project does.
+    The shortfall measures how far all tasks together are from the target, whereas the makespan depends only on the
+    worst task. Individuals that meet the target are compared by the objective of the instance.
     """
 
     weights = (-1.0, -1.0, -1.0, -1.0)
 
 
 class Individual:
-    """Genes of one allocation, its fitness, and a fingerprint that individuals share whose objectives are equal."""
+    """Genes of an allocation, its fitness, and a fingerprint that is the same for individuals with equal objectives."""
 
     def __init__(self, genes: Genes, values: tuple[float, ...], fingerprint: int) -> None:
         self.genes, self.fingerprint = genes, fingerprint
@@ -75,7 +74,7 @@ class Individual:
 
     @property
     def rank(self) -> tuple[float, ...]:
-        """Unserved tasks, makespan and energy, as the project compares them."""
+        """Unserved tasks, makespan and energy, for comparison by the objective of the instance."""
         unserved, _, makespan, energy = self.fitness.values
         return unserved, makespan, energy
 
@@ -122,11 +121,11 @@ class Evolution:
 
     @property
     def is_over(self) -> bool:
-        """Whether there was no better individual for `patience` generations."""
+        """Whether there has been no better individual for `patience` generations."""
         return self._stagnation >= self.parameters.patience
 
     def run(self, generations: float = math.inf) -> int:
-        """Evolve for so many generations, or until the epoch is over or the search should stop; return how many."""
+        """Evolve for up to `generations`, until the epoch is over or the search should stop; return the number done."""
         if not self._population:
             self._population = self._survivors(self._evaluated(self._initial_genes()))
         done = 0
@@ -142,13 +141,13 @@ class Evolution:
             self._select(self.encoding.encode(allocation)[None, :])
 
     def _select(self, genes: Genes) -> None:
-        """Keep the best of the population and of some rows of genes."""
+        """Keep the best of the population and the given rows of genes."""
         best = self._population[0].fitness
         self._population = self._survivors(self._population + self._evaluated(genes))
         self._stagnation = 0 if self._population[0].fitness > best else self._stagnation + 1
 
     def _initial_genes(self) -> Genes:
-        """Return the best so far, the start if there is one, and noisy list schedules."""
+        """Return the best allocation so far, the start if there is one, and noisy list schedules."""
         search, encoding, rng = self.search, self.encoding, self.rng
         assert search.best is not None
         known = [allocation for allocation in (search.best.allocation, search.start) if allocation is not None]
@@ -159,7 +158,7 @@ class Evolution:
         return np.concatenate([np.stack([encoding.encode(allocation) for allocation in known]), fresh])
 
     def _offspring(self, population: list[Individual]) -> Genes:
-        """Return as many children as the population may have individuals."""
+        """Return as many children as the size of the population."""
         toolbox, rng = self.toolbox, self.rng
         genes = np.stack([individual.genes for individual in population])
         parents = toolbox.select(len(population), self.size)
@@ -192,12 +191,12 @@ class Evolution:
         return individual.rank < (len(known.unserved_tasks), known.served_makespan, energy)
 
     def _survivors(self, individuals: list[Individual]) -> list[Individual]:
-        """Return the best, best first, and only the first of those with equal fingerprints."""
+        """Return the best individuals, best first, keeping only the first of those with equal fingerprints."""
         unique = {individual.fingerprint: individual for individual in reversed(individuals)}
         survivors: list[Individual] = self.toolbox.survive(list(unique.values()))
         return survivors
 
 
 def _fingerprints(group_ability: FloatArray, energy: FloatArray) -> list[int]:
-    """Return one number for each row, the same for rows with the same group abilities and energy."""
+    """Return a number for each row, which is the same for rows with the same group abilities and energy."""
     return [hash((row.tobytes(), cost)) for row, cost in zip(group_ability, energy.tolist(), strict=True)]

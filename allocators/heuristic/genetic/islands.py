@@ -1,4 +1,4 @@
-"""Populations that evolve side by side, each through epochs of its own, and share the best allocation."""
+"""Populations that evolve concurrently, each with its own epochs, and share the best allocation."""
 
 import math
 from collections import deque
@@ -15,10 +15,10 @@ TARGETS = (0.0, 0.5, 0.8, 0.95)
 """Target makespans of successive epochs, between the lower bound (0) and the best so far (1)."""
 
 MOST_ISLANDS = 32
-"""Islands beyond which further threads are not used."""
+"""Maximum number of islands; further threads are not used."""
 
 GENERATIONS = 10
-"""Generations of each island between two exchanges."""
+"""Generations of each island between two exchanges of the best allocation."""
 
 
 class Island:
@@ -27,12 +27,12 @@ class Island:
     Parameters
     ----------
     search : Search
-        Its own: no other thread uses it meanwhile.
+        Its own search, which no other thread uses.
     encoding : Encoding
     parameters : GeneticParameters
     rng : Generator
     epoch : int
-        Number of its first target.
+        Index of its first target.
     """
 
     def __init__(
@@ -48,7 +48,7 @@ class Island:
         self._evolution: Evolution | None = None
 
     def run(self, generations: float = math.inf) -> int:
-        """Evolve for so many generations, or until the search should stop; return how many there were."""
+        """Evolve for up to `generations`, or until the search should stop; return the number done."""
         done = 0
         while done < generations and not self.search.should_stop():
             if self._evolution is None or self._evolution.is_over:
@@ -66,7 +66,7 @@ class Island:
 
 
 def evolve_islands(search: Search, encoding: Encoding, parameters: GeneticParameters) -> None:
-    """Evolve one island for each thread, and submit every improvement; each gets the best of all now and then.
+    """Evolve one island per thread, submit every improvement, and periodically send the best of all to each island.
 
     Cohoon, Hegde, Martin and Richards (1987), ICGA, 148-154.
     """

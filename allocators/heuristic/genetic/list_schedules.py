@@ -1,4 +1,4 @@
-"""Noisy list schedules, with which a population begins."""
+"""Noisy list schedules as an initial population."""
 
 from collections.abc import Callable
 
@@ -18,18 +18,18 @@ def list_schedules(
     rng: np.random.Generator,
     stop: Callable[[], bool],
 ) -> Genes:
-    """Build one allocation per row by list scheduling: agent after agent, to the task with the lowest W / h.
+    """Build one allocation per row by list scheduling: assign each agent in turn to the task with the lowest W / h.
 
     Parameters
     ----------
     encoding : Encoding
     noise : ndarray, shape (rows,)
-        Standard deviation of what is added to the logarithm of an ability before agents are sorted, largest first.
+        Standard deviation of the noise on the logarithms of abilities, by which agents are sorted, largest first.
     distance_weight : ndarray, shape (rows,)
-        What the mean distance adds to W / h, in units of the final mean of W / h: 0 ignores distances.
+        Amount that the mean distance adds to W / h, in units of the final mean of W / h; 0 ignores distances.
     rng : Generator
     stop : callable
-        Checked now and then; once it is true, the remaining agents stay idle.
+        Checked periodically; when it returns true, the remaining agents stay idle.
 
     Returns
     -------

@@ -1,7 +1,7 @@
 """Mutation of the genetic algorithm: exchanges of agents between tasks with a surplus and with a shortfall.
 
-Whether a child is any good is left to selection: mutation evaluates no fitness, and neither repeats nor undoes a
-change, which is where local search would begin.
+In contrast to local search, mutation evaluates no fitness, and neither repeats nor undoes a change: that is left to
+selection.
 """
 
 from dataclasses import dataclass
@@ -24,20 +24,21 @@ class MutationParameters(CheckedParameters):
     exchanges : float
         Mean number of exchanges in a child, drawn geometrically.
     most_exchanges : int
-        Most exchanges in a child.
+        Maximum number of exchanges in a child.
     uniform : float
         Probability that a task is drawn regardless of surplus and shortfall.
     temperature : float
         Scale of the noise on the choice of agents, in units of mean ability per mean demand.
     distance_weight : float
-        Largest weight of the mean distance saved, relative to the whole demand of a task.
+        Largest weight of the mean distance saved, relative to the demand of a task.
     saving : float
-        Probability, where energy counts and no task has a shortfall, that the agent is drawn by its distance, and the
-        task by what it would save there.
+        Probability, if energy counts and no task has a shortfall, that the agent is drawn by its distance, and the task
+        by the distance that it would save there.
     pairs : float
-        Probability that up to two agents of each group, not one, are exchanged.
+        Probability that up to two agents of each group are exchanged instead of one.
     group_cap, pair_cap : int
-        Agents of a group that are considered, drawn at random from larger groups; for single agents and for pairs.
+        Number of agents of a group that are considered for exchanges of single agents and of pairs, drawn at random
+        from larger groups.
     """
 
     exchanges: float = bounded(2.0, low=1)
@@ -62,15 +63,15 @@ def mutate(
 ) -> Genes:
     """Exchange agents a few times in each row, in place, and return the rows.
 
-    An exchange takes a task with a shortfall, another one with a surplus, an agent (or two) of the second and an agent
-    (or two, or none) of the first, such that the difference of the abilities roughly fits. Where there is no shortfall,
-    any two tasks do. No agent is assigned to a task that it cannot reach.
+    An exchange takes one or two agents of a task with a surplus, and up to two of a task with a shortfall, such that
+    the difference of their abilities roughly fits. If there is no shortfall, any two tasks are used. No agent is
+    assigned to a task that it cannot reach.
 
     Parameters
     ----------
     genes : ndarray of int, shape (rows, n)
     target_makespan : float
-        In hours; shortfalls and surpluses refer to it.
+        Makespan in hours to which shortfalls and surpluses refer.
     encoding : Encoding
     rng : Generator
     energy_counts : bool
@@ -146,7 +147,7 @@ def _draw_giver(
 
 
 def draw_saving_move(some: Genes, encoding: Encoding, rng: np.random.Generator) -> tuple[IntArray, IntArray]:
-    """Draw an agent of each row in proportion to its distance, and a column by the square of what it saves there."""
+    """Draw an agent of each row in proportion to its distance, and a column by the square of the distance saved."""
     agents = np.arange(encoding.n)[None, :]
     cost = encoding.cost(agents, some.astype(np.intp))
     giver = roulette(cost, rng)

@@ -1,7 +1,7 @@
-"""Selection, crossover and random draws of the genetic algorithm, each on many rows of genes at once.
+"""Selection, crossover and random draws of the genetic algorithm, each for many rows of genes at once.
 
-All randomness comes from the generator that is passed in, never from the global `random` of DEAP's own operators, so
-that runs in several threads do not affect each other.
+All random numbers come from the generator that is passed in, and not from the global `random` that DEAP's own operators
+use, so that runs in several threads do not affect each other.
 """
 
 import numpy as np
@@ -12,10 +12,9 @@ from alloc.problems.instance import FloatArray, IntArray
 
 
 def tournament(size: int, rounds: int, rng: np.random.Generator, entrants: int = 3) -> IntArray:
-    """Return the winners of `rounds` tournaments among `size` individuals in order of fitness, best first.
+    """Return the winners of `rounds` tournaments among `size` individuals that are sorted by fitness, best first.
 
-    In that order, the winner is the least of the numbers drawn (Goldberg and Deb 1991,
-    doi:10.1016/B978-0-08-050684-5.50008-2).
+    The winner is the least of the indices drawn (Goldberg and Deb 1991, doi:10.1016/B978-0-08-050684-5.50008-2).
     """
     winners: IntArray = rng.integers(size, size=(rounds, entrants)).min(axis=1)
     return winners
@@ -24,14 +23,14 @@ def tournament(size: int, rounds: int, rng: np.random.Generator, entrants: int =
 def cross_groups(one: Genes, other: Genes, share: FloatArray, rng: np.random.Generator) -> Genes:
     """Replace some groups of each row of `one` by those of the same row of `other`, and return the children.
 
-    A random set of tasks is drawn, each with probability `share` of its row. Their groups in the child are those of
-    `other`; agents that were in them before go where `other` has them. All other agents stay. Every gene is that of a
-    parent, so that no child has an agent on a task that it cannot reach.
+    Tasks are drawn at random, each with probability `share` of its row. Their groups in the child are those of `other`;
+    agents that were in them before go where `other` has them. All other agents keep their tasks. Every gene is that of
+    a parent, so that no child has an agent on a task that it cannot reach.
 
     References
     ----------
-    Falkenauer (1994), doi:10.1162/evco.1994.2.2.123: groups should be inherited, not single genes. Here tasks are
-    distinguishable, unlike the bins there, so that no group has to be dissolved and filled anew.
+    Falkenauer (1994), doi:10.1162/evco.1994.2.2.123: groups should be inherited instead of single genes. Unlike the
+    bins there, tasks are distinguishable, so that no group has to be dissolved and refilled.
     """
     rows, width = len(one), int(max(one.max(), other.max())) + 1
     taken = (rng.random((rows, width)) < share[:, None]).ravel()
@@ -46,7 +45,7 @@ def draw_column(weight: FloatArray, rng: np.random.Generator, uniform: float) ->
 
 
 def roulette(weight: FloatArray, rng: np.random.Generator) -> IntArray:
-    """Draw one column of each row in proportion to its weight; any where all weights are 0."""
+    """Draw one column of each row in proportion to its weight; any column if all weights are 0."""
     largest = weight.max(axis=1, keepdims=True)
     total = np.cumsum(weight / np.where(largest > 0, largest, 1.0), axis=1)  # so that no sum overflows
     mark = rng.random((len(weight), 1)) * total[:, -1:]

@@ -1,4 +1,4 @@
-"""The method `greedy`: largest ability first, each agent to the worst-served task within its reach."""
+"""The method `greedy`: in order of decreasing ability, each agent gets the worst-served task within its reach."""
 
 import heapq
 
@@ -16,41 +16,42 @@ CHECK_EVERY = 256
 """Agents between two checks of the clock."""
 
 MOST_SCANNED = 20_000
-"""Agents up to which scanning all tasks is as fast as loading compiled code."""
+"""Number of agents up to which scanning all tasks is as fast as loading compiled code."""
 
 SLICE = 4_096
-"""Agents that compiled code assigns between two checks of the clock."""
+"""Number of agents that compiled code assigns between two checks of the clock."""
 
 LEAST_SHARED = 25_000
-"""Agents that each thread has at least."""
+"""Minimum number of agents per thread."""
 
 SHARED = 0.9
-"""Part of the agents, the ablest, that several threads assign; the others make up for what is uneven then."""
+"""Share of the agents, by decreasing ability, that several threads assign; the others then even out differences."""
 
 
 class Greedy(Allocator):
-    """List scheduling for machine covering: the task with the lowest W / h next, ties to the largest workload.
+    """List scheduling for machine covering: each agent gets the task with the lowest W / h, ties to the largest.
 
-    With travel times, an agent counts with what it does until the lower bound on the makespan. It has no parameters.
-    From 50,000 agents on, where not all reach every task at once, threads share the ablest nine tenths of them: each
-    serves all tasks by some agents of every size, and the other agents even out what is left.
+    With travel times, an agent counts with the work that it does until the lower bound on the makespan. There are no
+    parameters. With 50,000 agents or more, unless all of them reach every task without travel time, threads divide the
+    nine tenths with the highest abilities among them: each serves all tasks with agents of all abilities, and the
+    remaining agents even out differences.
 
     References
     ----------
-    Deuermeyer, Friesen and Langston (1982), doi:10.1137/0603019: 4/3 of the optimum where workloads are equal.
+    Deuermeyer, Friesen and Langston (1982), doi:10.1137/0603019: at most 4/3 of the optimum for equal workloads.
     """
 
     method = BUILT_IN["greedy"]
 
     def allocate(self, search: Search) -> Proposal:
-        """Return one allocation; agents that are left when time is up stay idle."""
+        """Return the greedy allocation; agents that are not assigned in time stay idle."""
         return Proposal(greedy(search.instance, search))
 
 
 def greedy(instance: Instance, search: Search | None = None) -> Allocation:
-    """Return the greedy allocation; ends early when `search` should stop.
+    """Return the greedy allocation; end early when `search` should stop.
 
-    Where energy counts, and every agent reaches every task at once, agents of equal ability then swap tasks.
+    If energy counts, and every agent reaches every task without travel time, agents of equal ability then swap tasks.
     """
     if instance.reach.is_complete and not instance.has_travel_time:
         task = _by_heap(instance, search)
@@ -63,7 +64,7 @@ def greedy(instance: Instance, search: Search | None = None) -> Allocation:
 
 
 def load_compiled(instance: Instance) -> None:
-    """Load the compiled code that `greedy` uses for this instance, if it does, which may take a second."""
+    """Load the compiled code that `greedy` uses for this instance, if any, which may take a second."""
     if not (_is_scanned(instance) or (instance.reach.is_complete and not instance.has_travel_time)):
         from alloc.allocators.heuristic.greedy.tree_search import compile_loops
 
@@ -75,9 +76,9 @@ def _is_scanned(instance: Instance) -> bool:
 
 
 def _by_tree(instance: Instance, search: Search | None) -> NDArray[np.intp]:
-    """Do as `_by_scan` in about O(n log m), by compiled code."""
+    """Return the same as `_by_scan`, in about O(n log m), by compiled code."""
     from alloc.allocators.heuristic.greedy.tree_search import (
-        TreeGreedy,  # loads the compiler, which small instances do without
+        TreeGreedy,  # loads numba, which small instances do not need
     )
 
     if not (instance.workload > 0).any():
@@ -94,14 +95,14 @@ def _by_tree(instance: Instance, search: Search | None) -> NDArray[np.intp]:
             part.assign(agents[begin : begin + SLICE])
 
     if shared:
-        twins = [tree.twin() for _ in range(threads)]
-        with thread_map(threads) as run_all:  # every thread serves all tasks, by agents of all sizes
+        clones = [tree.clone() for _ in range(threads)]
+        with thread_map(threads) as run_all:  # every thread serves all tasks, with agents of all abilities
             list(
                 run_all(
-                    lambda part: assign(twins[part], np.ascontiguousarray(order[part:shared:threads])), range(threads)
+                    lambda part: assign(clones[part], np.ascontiguousarray(order[part:shared:threads])), range(threads)
                 )
             )
-        tree.join(twins)
+        tree.join(clones)
     assign(tree, order[shared:])
     return tree.task
 
@@ -113,7 +114,7 @@ def _order(instance: Instance) -> list[int]:
 
 
 def _by_heap(instance: Instance, search: Search | None) -> NDArray[np.intp]:
-    """Assign agents that all reach every task, in O(n log m)."""
+    """Return the task of each agent if all agents reach every task, in O(n log m)."""
     work, ability = instance.workload.tolist(), instance.ability.tolist()
     task = np.full(instance.n, IDLE, dtype=np.intp)
     heap = [(0.0, -h, j) for j, h in enumerate(work) if h > 0]
@@ -130,7 +131,7 @@ def _by_heap(instance: Instance, search: Search | None) -> NDArray[np.intp]:
 
 
 def _by_scan(instance: Instance, search: Search | None) -> NDArray[np.intp]:
-    """Assign agents in O(n m), each scanning the tasks within its reach."""
+    """Return the task of each agent by scanning the tasks within its reach, in O(n m)."""
     reach, work = instance.reach, instance.workload
     task = np.full(instance.n, IDLE, dtype=np.intp)
     by_size = np.argsort(-work, kind="stable")

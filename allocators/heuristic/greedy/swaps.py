@@ -1,4 +1,4 @@
-"""Agents of equal ability swap tasks to reduce the distance; the ability on each task stays the same."""
+"""Swaps of tasks between agents of equal ability, which reduce the distance and leave group abilities unchanged."""
 
 from collections.abc import Callable
 
@@ -12,11 +12,11 @@ Indices = NDArray[np.intp]
 
 
 def reduce_distance(instance: Instance, task: Indices, stop: Callable[[], bool]) -> Indices:
-    """Reassign agents of equal ability among their tasks, near ones to near ones.
+    """Reassign agents of equal ability among their tasks, so that agents get near tasks.
 
     Agents and tasks are bisected together along the widest side of the tasks' bounding box, recursively, until one of
-    each is left: a matching of n agents in O(n log² n). For instances in which every agent reaches every task, and
-    travel takes no time.
+    each is left: a matching of n agents in O(n log² n). For instances without travel times in which every agent can
+    reach every task.
 
     Parameters
     ----------
@@ -24,12 +24,12 @@ def reduce_distance(instance: Instance, task: Indices, stop: Callable[[], bool])
     task : ndarray of int, shape (n,)
         Task of each agent, -1 for idle.
     stop : callable
-        Checked before each bisection; once it is true, what is left is matched in the present order.
+        Checked before each bisection; when it returns true, the rest is matched in the present order.
 
     Returns
     -------
     ndarray of int, shape (n,)
-        With no larger total cost than `task`.
+        The new tasks, with a total cost no larger than that of `task`.
     """
     start, goal = instance.reach.place[instance.reach.origin], instance.reach.goal
     movable = (task != IDLE) & ~np.isnan(start[:, 0])
@@ -58,7 +58,7 @@ def _match_by_bisection(
     ----------
     start, goal : ndarray, shape (k, 3)
     bounds : ndarray of int
-        Where groups begin, and k: both sides of group i are ``bounds[i]:bounds[i + 1]``.
+        Indices where groups begin, and k: starts and goals of group i are ``bounds[i]:bounds[i + 1]``.
     stop : callable
     """
     k = len(start)

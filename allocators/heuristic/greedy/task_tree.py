@@ -1,7 +1,7 @@
-"""A binary tree over tasks, each node with its bounding box and its worst-served task; compiled.
+"""A compiled binary tree over tasks, whose nodes have their bounding box and their worst-served task.
 
-The coverage of a task is its group ability divided by its workload, W / h; the worst-served task is that of least
-coverage, the first in `Tasks.rank` among equals.
+The coverage of a task is its group ability divided by its workload, W / h; the worst-served task has the least
+coverage, and the least `Tasks.rank` among equals.
 """
 
 from typing import NamedTuple
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from alloc.allocators.runtime.compiled import compiled, inlined
 
 LEAF_SIZE = 8
-"""Most tasks in a leaf."""
+"""Maximum number of tasks in a leaf."""
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -26,7 +26,7 @@ class Tree(NamedTuple):
     begin, end : ndarray of int, shape (nodes,)
         The tasks of each node are ``order[begin:end]``.
     low, high : ndarray, shape (nodes, 3)
-        Bounding box; infinite where the location of a task is unknown.
+        Bounding box; infinite if the position of a task is unknown.
     order : ndarray of int, shape (tasks,)
     leaf : ndarray of int, shape (m,)
         Leaf of each task, -1 for tasks that are not in the tree.
@@ -44,12 +44,12 @@ class Tree(NamedTuple):
 
 
 class Tasks(NamedTuple):
-    """The tasks; the last two fields are changed in place.
+    """The tasks and their groups; the last two fields are changed in place.
 
     Attributes
     ----------
     position : ndarray, shape (m, 3)
-        In the unit of `Reach`.
+        Coordinates as in `Reach`.
     workload : ndarray, shape (m,)
     rank : ndarray of int, shape (m,)
         Precedence among tasks of equal coverage, the largest workload first.
@@ -64,14 +64,14 @@ class Tasks(NamedTuple):
 
 
 def build_tree(position: Floats, tasks: Indices) -> Tree:
-    """Bisect `tasks` along the widest side of their bounding box, recursively; `worst` is not set yet.
+    """Build a tree by bisecting `tasks` along the widest side of their bounding box, recursively, without `worst`.
 
     Parameters
     ----------
     position : ndarray, shape (m, 3)
-        Locations of all tasks; NaN where unknown.
+        Positions of all tasks; unknown ones are NaN.
     tasks : ndarray of int
-        Those to be in the tree; at least one.
+        The tasks in the tree; at least one.
     """
     depth = max(0, int(np.ceil(np.log2(len(tasks) / LEAF_SIZE))))
     nodes = 2 ** (depth + 1) - 1
@@ -87,7 +87,7 @@ def build_tree(position: Floats, tasks: Indices) -> Tree:
         if level == depth:
             leaf[order] = here.start + node
             break
-        axis = np.argmax(high[here] - low[here], axis=1)  # the first where a location is unknown
+        axis = np.argmax(high[here] - low[here], axis=1)  # the first axis if a position is unknown
         order = order[np.lexsort((where[np.arange(len(order)), axis[node]], node))]
         middle = (begin[here] + end[here]) // 2
         begin[below] = np.column_stack([begin[here], middle]).ravel()
@@ -109,7 +109,7 @@ def update_node(
 ) -> None:
     """Set the worst-served task of `node`, whose children are up to date.
 
-    With `worst` earlier among the arguments, the search takes twice the time: the compiler then sees less.
+    With `worst` earlier among the arguments, the search takes twice as long, as the compiler optimises it less.
     """
     if 2 * node + 2 < len(begin):
         left, right = worst[2 * node + 1], worst[2 * node + 2]

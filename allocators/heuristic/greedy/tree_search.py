@@ -1,7 +1,7 @@
 """Greedy for a million agents: each finds the worst-served task within its reach in a tree over the tasks.
 
-An agent visits a node only if the bounding box is within its range and the node's worst-served task is served worse
-than the best candidate so far; where that task is within reach, the rest of the node is skipped.
+An agent visits a node only if its bounding box is within range and the node's worst-served task is served worse than
+the best candidate so far; if that task is within reach, the rest of the node is skipped.
 """
 
 from copy import copy
@@ -27,7 +27,7 @@ MARGIN = 1 - 1e-9
 """Factor on the distance to a box, against rounding errors."""
 
 STACK_SIZE = 64
-"""Nodes that a depth-first search of a binary tree can have pending."""
+"""Maximum number of pending nodes of a depth-first search of the binary tree."""
 
 
 class Agents(NamedTuple):
@@ -38,7 +38,7 @@ class Agents(NamedTuple):
     origin : ndarray of int, shape (n,)
     ability : ndarray, shape (n,)
     horizon : ndarray, shape (n,)
-        Distance below which an agent arrives in time to be of use.
+        Distance below which an agent arrives in time to contribute.
     task : ndarray of int, shape (n,)
         Task of each agent, -1 for none; changed in place.
     position : ndarray, shape (origins, 3)
@@ -49,7 +49,7 @@ class Agents(NamedTuple):
     list_begin, listed_task : ndarray of int
         Lists of tasks as a compressed sparse row.
     listed_distance : ndarray
-        How far each listed task is, all being within reach; empty where coordinates give that.
+        Distances of the listed tasks, which are all within reach; empty if coordinates determine distances.
     energy_per_distance : float
     """
 
@@ -76,7 +76,7 @@ class TreeGreedy:
     instance : Instance
         With at least one task that has workload.
     horizon : float
-        Hour by which an agent must be at its task to be of use there, where travel takes time.
+        Hour before which an agent must arrive at its task to contribute, if there are travel times.
     """
 
     def __init__(self, instance: Instance, horizon: float) -> None:
@@ -99,19 +99,19 @@ class TreeGreedy:
         """Assign each of `agents`, in this order, to the worst-served task within its reach."""
         _assign(agents, self._tree, self._tasks, self._agents)
 
-    def twin(self) -> "TreeGreedy":
-        """Return one for other agents, which counts those of this one so far and shares the array of tasks."""
-        twin = copy(self)
-        twin._tree = self._tree._replace(worst=self._tree.worst.copy())
-        twin._tasks = self._tasks._replace(
+    def clone(self) -> "TreeGreedy":
+        """Return a copy for other agents, with the group abilities so far, which shares the array `task`."""
+        clone = copy(self)
+        clone._tree = self._tree._replace(worst=self._tree.worst.copy())
+        clone._tasks = self._tasks._replace(
             group_ability=self._tasks.group_ability.copy(), coverage=self._tasks.coverage.copy()
         )
-        return twin
+        return clone
 
-    def join(self, twins: "list[TreeGreedy]") -> None:
-        """Count what agents of twins do as well; they had none in common, and began when this one had none."""
-        for twin in twins:
-            self._tasks.group_ability[:] += twin._tasks.group_ability
+    def join(self, clones: "list[TreeGreedy]") -> None:
+        """Add the group abilities of clones, which were made before this object had agents and have none in common."""
+        for clone in clones:
+            self._tasks.group_ability[:] += clone._tasks.group_ability
         self._tasks.coverage[:] = self._tasks.group_ability / np.where(
             self._tasks.workload > 0, self._tasks.workload, 1
         )
@@ -145,7 +145,7 @@ class _Lists(TypedDict):
 
 
 def _lists(reach: Reach) -> _Lists:
-    """Return the lists of tasks; where coordinates do not give distances, each origin has that of all within reach."""
+    """Return the lists of tasks; without distances by coordinates, each origin lists all tasks within reach."""
     if reach.is_plain:
         return _Lists(
             list_of=reach.list_of,
@@ -164,7 +164,7 @@ def _lists(reach: Reach) -> _Lists:
 
 
 def compile_loops() -> None:
-    """Compile the loops, or read them from the cache."""
+    """Compile the loops, or load them from the cache."""
     TreeGreedy(Instance(ability=[1.0], workload=[1.0]), 1.0).assign(np.zeros(1, dtype=np.intp))
 
 
@@ -234,7 +234,7 @@ def _worst_in_tree(agent: int, tree: Tree, tasks: Tasks, agents: Agents, stack: 
             left, right = 2 * node + 1, 2 * node + 2
             if is_worse(worst[left], worst[right], coverage, rank):
                 left, right = right, left
-            stack[size], stack[size + 1] = left, right  # the worse-served is visited first
+            stack[size], stack[size + 1] = left, right  # the worse-served child is visited first
             size += 2
         else:
             for entry in range(begin[node], end[node]):
@@ -255,7 +255,7 @@ def is_reachable(distance: float, longest: float, battery: float, energy_per_dis
 
 @compiled
 def straight_distance(one: Floats, other: Floats) -> float:
-    """Return the distance as in `alloc.problems.distances.metric`, to the last bit."""
+    """Return the same distance as `alloc.problems.distances.metric`, bit for bit."""
     x, y, z = one[0] - other[0], one[1] - other[1], one[2] - other[2]
     distance = float(np.sqrt(x * x + y * y + z * z))
     return 0.0 if np.isnan(distance) else distance

@@ -1,1 +1,1 @@
-"""Local search in compiled code: annealed exchanges between two groups, each solved exactly."""
+"""Local search in compiled code: annealing over exchanges between two groups, each of which is solved exactly."""

@@ -1,4 +1,4 @@
-"""Local search: simulated annealing over exchanges between two groups, until the budget ends."""
+"""The method `local-search`: simulated annealing over exchanges between two groups, until the budget ends."""
 
 from typing import ClassVar
 
@@ -20,9 +20,9 @@ class LocalSearch(Allocator):
     """Simulated annealing in a very large neighbourhood.
 
     An exchange reassigns the agents of two tasks, or of one task and the idle agents, at the least cost: the distance,
-    a penalty for the ability that either task lacks for the target makespan, and random noise per agent that decreases
-    during the run. The assignment is exact, by dynamic programming over sums of abilities where they are integers, and
-    by enumeration of subsets elsewhere. An iteration is a thousand exchanges. With thousands of agents, it begins with
+    plus a penalty on the shortfalls of both tasks at the target makespan, plus random noise per agent that decreases
+    during the run. The assignment is exact: by dynamic programming over sums of abilities if these are integers, else
+    by enumeration of subsets. An iteration is a thousand exchanges. With thousands of agents, the search begins with
     prices of tasks, which give a bound and a plan near it.
 
     Parameters
@@ -50,12 +50,12 @@ class LocalSearch(Allocator):
         compile_loops()
 
     def prepare(self, instance: Instance) -> None:
-        """Compile the loops of task prices where they are used."""
+        """Compile the loops of task prices if these are used."""
         if are_prices_used(instance):
             compile_prices()
 
     def allocate(self, search: Search) -> Proposal:
-        """Improve the start allocation, or else the greedy one, and submit every improvement."""
+        """Improve the better of the start and the greedy allocation, and submit every improvement."""
         instance = search.instance
         if not (instance.workload > 0).any():
             return Proposal(Allocation.idle(instance))

@@ -1,4 +1,4 @@
-"""Simulated annealing over exchanges and ejection chains, compiled."""
+"""Compiled simulated annealing over exchanges and ejection chains."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,30 +25,30 @@ from alloc.allocators.runtime.compiled import compiled
 from alloc.allocators.runtime.random import draw
 
 TRIES = 30
-"""Agents that are drawn to find one that can reach a task."""
+"""Maximum number of draws to find an agent that can reach a task."""
 
 ANY_TASK_PERIOD = 8
-"""One in so many exchanges is with any task, not with a candidate."""
+"""Period of exchanges with any task instead of a candidate, on average."""
 
 FEW = 3
-"""Agents in an exchange up to which an ejection chain follows: hardly any agent can do both of its tasks."""
+"""Number of agents in an exchange up to which an ejection chain follows, as few agents can do both tasks."""
 
 LENGTH = 3
-"""Most tasks that a shortfall passes through in an ejection chain."""
+"""Maximum number of tasks through which an ejection chain passes a shortfall."""
 
 PRICE_GROWTH = 0.3
-"""Relative rise of the price of a task with each exchange that leaves it short, per relative shortfall."""
+"""Relative increase of the price of a task after each exchange that leaves it short, per relative shortfall."""
 
 HIGHEST_PRICE = 1e6
-"""Highest price, where the mean is 1 when the search for a target makespan begins."""
+"""Highest price; the mean price is 1 when the search for a target makespan begins."""
 
 SMALLEST_GAIN = 1e-10
-"""Relative improvement of the cost from which on a plan is saved as the best."""
+"""Least relative improvement of the cost for a plan to be saved as the best."""
 
 
 @compiled
 def draw_candidate(random: NDArray[np.uint64], tasks: int, candidates: Int32Array) -> int:
-    """Return a random task of one row of candidates, now and then any task."""
+    """Return a random task from a row of candidates, or occasionally any task."""
     if draw(random, ANY_TASK_PERIOD) == 0:
         return draw(random, tasks)
     candidate: int = candidates[draw(random, candidates.shape[0])]
@@ -57,10 +57,10 @@ def draw_candidate(random: NDArray[np.uint64], tasks: int, candidates: Int32Arra
 
 @compiled
 def draw_helper(arrays: InstanceArrays, plan: Plan, candidates: Candidates, task: int) -> int:
-    """Return a random agent, one that can reach `task` if a few draws find any.
+    """Return a random agent, which can reach `task` if a few draws find such an agent.
 
-    Without a table, mostly one of a task that some agent of `task` can do as well, or that is near it: of a million
-    agents hardly any reaches a given task.
+    Without a table of distances, it is mostly an agent of a task that is near to, or listed for, an agent of `task`: of
+    a million agents, hardly any reaches a given task.
     """
     agent = 0
     table, origin, random, agents = arrays.distance, arrays.origin, plan.random, plan.group_of_agent.shape[0]
@@ -81,8 +81,8 @@ def draw_helper(arrays: InstanceArrays, plan: Plan, candidates: Candidates, task
 
 
 @compiled
-def touch(plan: Plan, work: Workspace, weights: Weights, count: int, group: int) -> int:
-    """Note the ability of a group and its penalty before it changes, unless that is done; return how many there are."""
+def note_group(plan: Plan, work: Workspace, weights: Weights, count: int, group: int) -> int:
+    """Record ability and penalty of a group before it changes, once; return the number of recorded groups."""
     for index in range(count):
         if work.touched[index] == group:
             return count
@@ -93,14 +93,14 @@ def touch(plan: Plan, work: Workspace, weights: Weights, count: int, group: int)
 
 @compiled
 def shortfall_penalty(plan: Plan, weights: Weights, group: int) -> float:
-    """Return the penalty of a group as it is; the idle agents need nothing."""
+    """Return the penalty of the current shortfall of a group; the group of idle agents has no demand."""
     missing = plan.demand[group] - plan.group_ability[group]
     return penalty(weights, plan.price[group], missing, plan.size[group] == 0)
 
 
 @compiled
-def send(arrays: InstanceArrays, plan: Plan, makespan: float, agent: int, task: int) -> bool:
-    """Move an agent to another task, whatever follows; return whether it can go there."""
+def relocate(arrays: InstanceArrays, plan: Plan, makespan: float, agent: int, task: int) -> bool:
+    """Move an agent to another task unconditionally; return whether it can do that task."""
     row, w, slow = arrays.origin[agent], arrays.ability[agent], arrays.hours_per_distance[agent]
     other = plan.group_of_agent[agent]
     here, cost_here = distance_and_cost(arrays, row, task)
@@ -118,7 +118,7 @@ def send(arrays: InstanceArrays, plan: Plan, makespan: float, agent: int, task: 
 
 @compiled
 def undo(plan: Plan, work: Workspace, since: int, count: int, cost: float) -> None:
-    """Take back the moves since the log had so many, and the changes of so many groups."""
+    """Undo the moves from entry `since` of the log on, and the changes of the first `count` recorded groups."""
     idle = plan.demand.shape[0] - 1
     for number in range(plan.counter[N_LOGGED] - 1, since - 1, -1):
         move(plan, plan.moved[number % LOG_SIZE], plan.source[number % LOG_SIZE])
@@ -141,10 +141,10 @@ def eject(
     agent: int,
     task: int,
 ) -> None:
-    """Send an agent from its task to another one, let others make up for it, and keep what comes of it if cheaper.
+    """Move an agent to another task, repair the resulting shortfalls in turn, and keep the result if cheaper.
 
-    Its former task takes idle agents, or agents of a third task, which is short then in its turn; in the end, `task`
-    lets go whom it no longer needs. Penalties of shortfalls on the way do not count.
+    Its former task takes idle agents, or agents of a third task, which may then become short in turn; finally, `task`
+    releases the agents that it no longer needs. Penalties of intermediate shortfalls are ignored.
 
     References
     ----------
@@ -153,10 +153,12 @@ def eject(
     """
     idle, since, cost = plan.demand.shape[0] - 1, plan.counter[N_LOGGED], plan.cost[CURRENT]
     former = short = plan.group_of_agent[agent]
-    if short == task or plan.demand[task] == 0.0 or plan.demand[short] == 0.0:  # as that of idle agents is
+    if short == task or plan.demand[task] == 0.0 or plan.demand[short] == 0.0:  # the demand of idle agents is 0
         return
-    count = touch(plan, work, weights, touch(plan, work, weights, touch(plan, work, weights, 0, idle), short), task)
-    if not send(arrays, plan, makespan, agent, task):
+    count = note_group(plan, work, weights, 0, idle)
+    count = note_group(plan, work, weights, count, short)
+    count = note_group(plan, work, weights, count, task)
+    if not relocate(arrays, plan, makespan, agent, task):
         return
     for _ in range(LENGTH):
         if plan.size[idle] > 0:
@@ -167,7 +169,7 @@ def eject(
         third = plan.group_of_agent[helper]
         is_way_back = third == task and short == former
         if third != short and plan.demand[third] > 0.0 and not is_way_back:
-            count = touch(plan, work, weights, count, third)
+            count = note_group(plan, work, weights, count, third)
             exchange(arrays, plan, work, weights, makespan, helper, short, third)
             if plan.group_ability[third] < plan.demand[third]:
                 short = third
@@ -182,7 +184,7 @@ def eject(
 
 @compiled
 def raise_price(plan: Plan, task: int) -> None:
-    """Raise the price of a short task, so that its shortfall goes on to tasks that can make up for it."""
+    """Raise the price of a short task, so that its shortfall moves to tasks that can compensate for it."""
     shortfall = 1.0 - plan.group_ability[task] / plan.demand[task]
     plan.price[task] = min(plan.price[task] * (1.0 + PRICE_GROWTH * shortfall), HIGHEST_PRICE)
 
@@ -198,15 +200,15 @@ def anneal(
     weights: Weights,
     cooling: float,
 ) -> float:
-    """Make `steps` exchanges, the noise multiplied by `cooling` before each; return the last noise.
+    """Make `steps` exchanges, multiplying the noise by `cooling` before each; return the last noise.
 
-    A task that stays short rises in price: shortfalls go on, over any number of tasks, to where agents are cheap, as in
-    auctions. Where cost has no weight, only exchanges with short tasks are made, until there is none; otherwise the
+    The price of a task that stays short rises: shortfalls move, over any number of tasks, to where agents are cheap, as
+    in auctions. If cost has no weight, only exchanges with short tasks are made, until there are none; otherwise the
     plan of least cost without a shortfall is saved.
 
     References
     ----------
-    Penalties that rise where a constraint stays violated: Morris (1993), AAAI-93, 40-45; Yagiura, Ibaraki and Glover
+    Penalties that rise while a constraint is violated: Morris (1993), AAAI-93, 40-45; Yagiura, Ibaraki and Glover
     (2004), doi:10.1287/ijoc.1030.0036.
     """
     tasks, agents = plan.demand.shape[0] - 1, plan.group_of_agent.shape[0]

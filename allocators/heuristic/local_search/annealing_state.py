@@ -1,4 +1,4 @@
-"""The state of simulated annealing: a plan, its target makespan, arrays for the loops, and penalties that adapt."""
+"""The state of simulated annealing: a plan, its target makespan, arrays for the loops, and adaptive penalties."""
 
 import math
 from copy import copy, deepcopy
@@ -24,25 +24,25 @@ from alloc.problems import IDLE, Allocation, Instance
 from alloc.problems.instance import FloatArray, IntArray
 
 PRICE_DECAY = 0.99
-"""Power by which the prices of tasks fall towards 1 in each run in which the cost counts."""
+"""Exponent applied to the prices of tasks in each run in which the cost counts, so that they decay towards 1."""
 
 ROUNDING = 1e-12
-"""Relative part by which demands are lowered, against rounding errors of sums."""
+"""Relative amount by which demands are lowered, against rounding errors of sums."""
 
 RISE, FALL = 1.2, 0.9
-"""Factors by which the penalty changes after a period that ends with a shortfall, and without one."""
+"""Factors on the penalty after a period that ends with a shortfall, and without one."""
 
 LOWEST, HIGHEST = 0.1, 100.0
-"""Limits of the factor; 1 to begin with."""
+"""Limits of the penalty factor, which is initially 1."""
 
 EXCHANGES_PER_AGENT = 5.0
-"""Length of a period."""
+"""Length of a period, in exchanges per agent."""
 
 LEAST_EXCHANGES = 250.0
-"""Exchanges per agent that the budget must allow, for it takes many periods."""
+"""Least exchanges per agent of a budget with an adaptive penalty, which takes many periods."""
 
 PATIENCE = 3
-"""Periods in a row that end with a shortfall, after one more of which the search returns to the best plan."""
+"""Consecutive periods that may end with a shortfall; after one more, the search returns to the best plan."""
 
 
 class AnnealingState:
@@ -58,9 +58,9 @@ class AnnealingState:
     Attributes
     ----------
     candidate_cost : float
-        Mean cost of a flight from an origin to its candidates, the unit of noise on costs.
+        Mean cost of a flight from an origin to its candidates, which is the unit of noise on costs.
     mean_ability : float
-        In the unit of `arrays`.
+        Mean ability, in the unit of `arrays`.
     """
 
     def __init__(self, instance: Instance, seed: int, neighbours: int) -> None:
@@ -77,13 +77,13 @@ class AnnealingState:
         self.mean_ability = float(self.arrays.ability.mean())
         self._integer_ability = float(self.arrays.ability.max()) if self.arrays.integer_ability else np.inf
 
-    def twin(self, seed: int | list[int]) -> "AnnealingState":
-        """Return another state for the same instance, with the same arrays and random numbers of its own."""
-        twin = copy(self)
-        twin.workspace = workspace(seed)
+    def clone(self, seed: int | list[int]) -> "AnnealingState":
+        """Return another state for the same instance, with the same arrays and its own random numbers."""
+        clone = copy(self)
+        clone.workspace = workspace(seed)
         random = np.random.default_rng(seed).integers(1, 2**63, 1, dtype=np.uint64)
-        twin.plan = idle_plan(self.instance.n, self.instance.m, random)
-        return twin
+        clone.plan = idle_plan(self.instance.n, self.instance.m, random)
+        return clone
 
     @property
     def n_short(self) -> int:
@@ -91,7 +91,7 @@ class AnnealingState:
         return int(self.plan.counter[N_SHORT])
 
     def begin(self, allocation: Allocation, makespan: float, price: FloatArray | None = None) -> None:
-        """Continue from an allocation, with a target makespan in hours and prices of tasks; by default all have one."""
+        """Continue from an allocation, with a target makespan in hours and prices of tasks, which are 1 by default."""
         idle = self.instance.m
         group = np.where(allocation.task_of_agent == IDLE, idle, allocation.task_of_agent).astype(np.int32)
         group[np.append(self.instance.workload == 0, False)[group]] = idle
@@ -103,7 +103,7 @@ class AnnealingState:
         self.set_target(makespan)
 
     def set_target(self, makespan: float) -> None:
-        """Keep the plan and the prices, and set another target makespan; no plan is the best then."""
+        """Keep the plan and the prices, set another target makespan, and discard the best plan."""
         arrays, demand, price = self.arrays, self.plan.demand, self.plan.price
         price /= np.exp(np.log(price).mean())
         self.makespan = makespan
@@ -113,10 +113,10 @@ class AnnealingState:
         demand[:-1] = np.minimum(np.ceil(exact) if arrays.integer_ability else exact, 1e300)
         self.recompute()
         self.plan.cost[BEST] = np.inf
-        self.plan.counter[N_MOVES] = self.instance.n + 1  # so that all of the first best plan is written
+        self.plan.counter[N_MOVES] = self.instance.n + 1  # so that the first best plan is written completely
 
     def return_to_best(self) -> None:
-        """Continue from `best`, if there is one, with the prices as they are."""
+        """Continue from `best`, if there is one, with the current prices."""
         if self.best_cost < np.inf:
             self._set_groups(self.plan.best_group.copy())
             self.recompute()
@@ -127,20 +127,20 @@ class AnnealingState:
         return Weights(cost, noise, short_task, shortfall, 2.0, self._integer_ability)
 
     def begin_part(self, whole: "AnnealingState", part: int, part_of_task: IntArray, part_of_agent: IntArray) -> None:
-        """Continue from another state, with some of its tasks and agents; those of other parts stay as they are.
+        """Continue from another state, changing only the tasks and agents of one part.
 
         Parameters
         ----------
         whole : AnnealingState
         part : int
-            The number of this part.
+            Number of this part.
         part_of_task, part_of_agent : ndarray of int, shape (m,) and (n,)
-            Agents belong to the part of their task; idle ones to any. At least one task is of another part.
+            Agents belong to the part of their task, idle ones to any part. At least one task belongs to another part.
         """
         plan, idle = deepcopy(whole.plan), self.instance.m
         self.makespan, self._least_slots = whole.makespan, whole._least_slots
         elsewhere = np.flatnonzero(part_of_task != part)
-        plan.demand[elsewhere] = 0.0  # no exchange is made with tasks that need nothing
+        plan.demand[elsewhere] = 0.0  # tasks without demand are not exchanged with
         spare = plan.slot[plan.begin[idle] : plan.begin[idle] + plan.size[idle]].copy()
         mine = spare[part_of_agent[spare] == part]
         plan.group_of_agent[spare[part_of_agent[spare] != part]] = elsewhere[0]
@@ -155,7 +155,7 @@ class AnnealingState:
         self.plan = plan._replace(random=self.plan.random)
 
     def join(self, parts: "list[AnnealingState]", part_of_task: IntArray, part_of_agent: IntArray) -> None:
-        """Take over the plans of parts that began from this state; see `begin_part`."""
+        """Merge the plans of parts that began from this state; see `begin_part`."""
         group, best = self.plan.group_of_agent.copy(), self.plan.group_of_agent.copy()
         cost = self.cost
         for number, part in enumerate(parts):
@@ -168,7 +168,7 @@ class AnnealingState:
             self.plan.best_group[:], self.plan.cost[BEST] = best, cost
         self._set_groups(group)
         self.recompute()
-        self.plan.counter[N_MOVES] = self.instance.n + 1  # the journal of moves is that of no plan
+        self.plan.counter[N_MOVES] = self.instance.n + 1  # invalidates the journal of moves
 
     def run(self, steps: int, weights: Weights, cooling: float = 1.0) -> float:
         """Make exchanges; return the last noise."""
@@ -197,17 +197,17 @@ class AnnealingState:
 
     @property
     def best_cost(self) -> float:
-        """Distance of `best`, ``inf`` for none."""
+        """Cost of `best`; ``inf`` if there is none."""
         return float(self.plan.cost[BEST])
 
     @property
     def cost(self) -> float:
-        """Distance of the current plan."""
+        """Cost of the current plan."""
         return float(self.plan.cost[CURRENT])
 
     @property
     def current_makespan(self) -> float:
-        """Makespan of the current plan in hours, where travel takes no time."""
+        """Makespan of the current plan in hours, for instances without travel times."""
         work = self.plan.demand[:-1] > 0
         with np.errstate(divide="ignore"):
             longest = (self.instance.workload[work] / self.plan.group_ability[:-1][work]).max()
@@ -228,11 +228,11 @@ class AnnealingState:
 
 
 class PenaltyFactor:
-    """Strategic oscillation: the factor on the penalties of shortfalls, and the returns to the best plan.
+    """Strategic oscillation: a factor on the penalties of shortfalls, and returns to the best plan.
 
-    The factor rises where plans stay short, and falls where none is. Where the makespan leaves much room, a low penalty
-    lets shortfalls pass from task to task for less energy. At the very least makespan few plans have none, and a search
-    that has lost them seldom finds another: it returns to the best one.
+    The factor rises while plans have shortfalls, and falls while they have none. If the makespan leaves much slack, a
+    low penalty lets shortfalls move between tasks, which saves energy. At the least makespan, few plans are without
+    shortfalls, and a search that has left them seldom finds another: it then returns to the best plan.
 
     Parameters
     ----------
@@ -240,7 +240,7 @@ class PenaltyFactor:
     exchanges : int
         Exchanges in an iteration.
     allowed : float
-        Exchanges per agent that the budget allows.
+        Number of exchanges per agent that the budget allows.
 
     Attributes
     ----------
@@ -253,7 +253,7 @@ class PenaltyFactor:
         self._iterations, self._short_periods = 0, 0
 
     def update(self, iterations: int) -> None:
-        """Take note of so many iterations more."""
+        """Count further iterations, and adapt the factor at the end of a period."""
         self._iterations += iterations
         if self._iterations < self._period:
             return

@@ -16,10 +16,10 @@ from alloc.problems import Instance
 from alloc.problems.instance import FloatArray
 
 MOST_ROWS = 100_000
-"""Origins up to which each has its own candidates; beyond, it has those of its nearest task."""
+"""Number of origins up to which each has its own candidates; with more, they have those of their nearest task."""
 
 SAMPLE_SIZE = 1000
-"""Origins over which the mean cost of a flight to a candidate is taken."""
+"""Number of origins for estimating the mean cost of a flight to a candidate."""
 
 
 class Candidates(NamedTuple):
@@ -30,7 +30,7 @@ class Candidates(NamedTuple):
     row : ndarray of int, shape (origins,)
         Row of each origin in `of_origin`.
     of_origin : ndarray of int, shape (rows, k)
-        Tasks near an origin, -1 for none; with a table of distances, those within reach, as often as there is room.
+        Tasks near an origin, -1 for none; with a table of distances, tasks within reach, repeated to fill the row.
     of_task : ndarray of int, shape (m, k)
         Tasks near a task, -1 for none.
     """
@@ -66,7 +66,7 @@ def arrays_and_candidates(instance: Instance, count: int) -> tuple[InstanceArray
 def mean_candidate_cost(arrays: InstanceArrays, candidates: Candidates) -> float:
     """Return the mean cost from an origin to its candidates, over a sample; 1 if there is none.
 
-    By straight lines, but where costs are something else, and tabulated.
+    Costs are straight-line distances, unless there is a table of other costs.
     """
     rows = np.arange(0, len(arrays.origin_position), max(1, len(arrays.origin_position) // SAMPLE_SIZE))
     tasks = candidates.of_origin[candidates.row[rows]]
@@ -80,9 +80,9 @@ def mean_candidate_cost(arrays: InstanceArrays, candidates: Candidates) -> float
 
 
 def _nearest_by_table(table: FloatArray, count: int) -> Int32Array:
-    """Return the nearest tasks of each origin, ties broken at random; where fewer are within reach, these repeated.
+    """Return the nearest tasks of each origin, with ties broken at random; repeated if fewer are within reach.
 
-    -1 alone where none is: a draw from a row is lost on it.
+    A row is filled with -1 only if no task is within reach, as draws of -1 are wasted.
     """
     shuffle = np.random.default_rng(0).permutation(table.shape[1])
     shuffled = table[:, shuffle]
@@ -95,7 +95,7 @@ def _nearest_by_table(table: FloatArray, count: int) -> Int32Array:
 
 
 def _nearest_by_position(position: FloatArray, task_position: FloatArray, count: int) -> Int32Array:
-    """Return the nearest tasks of each position, -1 where it is unknown or there are too few tasks."""
+    """Return the nearest tasks of each position, -1 if it is unknown or there are too few tasks."""
     known, given = np.flatnonzero(~np.isnan(task_position[:, 0])), ~np.isnan(position[:, 0])
     found = np.full((len(position), count), -1, dtype=np.int32)
     if len(known) and given.any():

@@ -1,4 +1,4 @@
-"""Distances from origins to tasks, compiled."""
+"""Compiled distances from origins to tasks."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +10,7 @@ from alloc.problems.instance import FloatArray
 
 @compiled
 def listed_entry(list_begin: NDArray[np.int64], listed_task: Int32Array, origin: int, task: int) -> int:
-    """Return where a task stands in the list of an origin, -1 if it does not."""
+    """Return the index of a task in the list of an origin, -1 if it is not listed."""
     low, high = list_begin[origin], list_begin[origin + 1]
     end = high
     while low < high:
@@ -34,9 +34,9 @@ def compute_distance(
     origin: int,
     task: int,
 ) -> float:
-    """Return the distance from an origin to a task, ``inf`` where it is out of reach, bit for bit as `Reach` does.
+    """Return the distance from an origin to a task, ``inf`` if it is out of reach, bit for bit as `Reach` does.
 
-    Takes arrays rather than `InstanceArrays`, as passing that costs more than the distance.
+    The arguments are single arrays, as passing `InstanceArrays` would cost more than the distance itself.
     """
     total = 0.0
     for axis in range(3):
@@ -70,7 +70,7 @@ def untabulated_distance(arrays: InstanceArrays, origin: int, task: int) -> floa
 
 @inlined
 def distance_and_cost(arrays: InstanceArrays, origin: int, task: int) -> tuple[float, float]:
-    """Return the distance from an origin to a task, ``inf`` where it is out of reach, and the cost of the flight."""
+    """Return the distance from an origin to a task, ``inf`` if it is out of reach, and the cost of the flight."""
     if arrays.distance.shape[0] > 0:
         return arrays.distance[origin, task], arrays.cost[origin, task]
     if arrays.listed_distance.shape[0] > 0:

@@ -1,4 +1,4 @@
-"""One exchange: agents of two groups are reassigned to them at the least cost; compiled."""
+"""A compiled exchange, which reassigns agents of two groups to these groups at the least cost."""
 
 import numpy as np
 
@@ -100,10 +100,10 @@ def exchange(
     task: int,
     other: int,
 ) -> int:
-    """Reassign the agents of two groups to them at the least cost: of flights, by weight, of noise and of shortfalls.
+    """Reassign the agents of two groups at the least sum of weighted flight costs, noise and shortfall penalties.
 
-    Of large groups only some agents take part, from `agent` on where that is one of them, from a random one on else
-    (-1). `other` may be the group of idle agents. Returns how many agents took part.
+    Of large groups, only some agents take part: from `agent` on in its group, and from a random one on otherwise (-1).
+    `other` may be the group of idle agents. Returns the number of agents that took part.
     """
     if plan.demand[other] < plan.demand[task] and other != plan.demand.shape[0] - 1:
         task, other = other, task
@@ -112,7 +112,7 @@ def exchange(
     enumerated = POOL_ENUMERATED if arrays.instant_travel else POOL_TRAVELLING
     if plan.size[task] + plan.size[other] <= enumerated:
         most = enumerated
-    elif not arrays.instant_travel:  # contributions depend on the task, so that meeting in the middle does not apply
+    elif not arrays.instant_travel:  # meeting in the middle does not apply, as contributions depend on the task
         most = enumerated // 2
     pool: int = np.int64(0)  # type: ignore[assignment]
     for group in (task, other):
@@ -141,7 +141,7 @@ def exchange(
         other_all_in_pool=pool - members == plan.size[other] and plan.demand[other] > 0.0,
     )
     if other == plan.demand.shape[0] - 1:
-        most_needed = missing + largest  # a group that needs all its agents has less to spare than any of them
+        most_needed = missing + largest  # a group that needs all its agents has a surplus below any of their abilities
     else:
         most_needed = max(missing, total - other_missing) + weights.surplus
     largest_sum = int(max(0.0, min(total, most_needed)))

@@ -1,4 +1,4 @@
-"""Improve any plan by annealing: first its makespan, then its energy within that; or repair a plan in force."""
+"""Improvement of a plan by annealing: first its makespan, then its energy; or repair of a plan in force."""
 
 import math
 import time
@@ -17,32 +17,32 @@ from alloc.problems.evaluation import RELATIVE_TOLERANCE
 from alloc.problems.instance import IntArray
 
 HARD = 100.0
-"""Factor on penalties that makes them outweigh any distance."""
+"""Factor on penalties with which they outweigh any distance."""
 
 HARD_FROM = 0.95
-"""Part of the budget after which no shortfall is accepted."""
+"""Share of the budget after which no shortfall is accepted."""
 
 FIRST_CYCLE_SHARE = 0.1
-"""Part of a long budget for a first annealing cycle, so that a run that is stopped early has a good plan."""
+"""Share of a long budget for a first annealing cycle, so that a run that is stopped early has a good plan."""
 
 PATIENCE, LEAST_SHARE = 3.0, 0.2
-"""Time without a smaller makespan, as a multiple of the time until then, and share of the time for it, after which the
-energy has its turn."""
+"""The search for less makespan ends if the time since the last improvement is this multiple of the time before it, but
+not before this share of its time has passed."""
 
 EXCHANGES_PER_TASK = 20.0
-"""Least number of exchanges in an attempt, for each task."""
+"""Minimum number of exchanges per task in an attempt."""
 
 REPORT_INTERVAL = 20.0
-"""Time between two reports, as a multiple of the time that scoring one plan takes."""
+"""Time between two reports, as a multiple of the time for scoring a plan."""
 
 REPORT_ITERATIONS, AGENTS_PER_ITERATION = 20, 500
-"""Iterations between two reports where the clock must not matter; more where there are so many times more agents."""
+"""Least iterations between two reports without a time limit, and agents per iteration if that gives more."""
 
 MOVES_NOISE = 1.0
-"""First noise where moves have a price, relative to the mean cost: much, as nearly all moves cost the same."""
+"""Initial noise if moves have a price, relative to the mean cost; it is high, as nearly all moves cost the same."""
 
 REPAIRS_PER_AGENT = 400
-"""Most exchanges of a repair, for each agent."""
+"""Maximum number of exchanges per agent in a repair."""
 
 
 def improve(
@@ -58,18 +58,18 @@ def improve(
     Parameters
     ----------
     search : Search
-        Its best plan is the initial one.
+        The run; its best plan is the initial one.
     until_s : float
-        Time limit, on ``search.elapsed_s``.
+        Value of ``search.elapsed_s`` at which to end.
     iterations : float
-        Most iterations, of ``parameters.exchanges`` exchanges each.
+        Maximum number of iterations of ``parameters.exchanges`` exchanges each.
     priced : PricedPlan, optional
         A plan from prices of tasks, from which the search for less makespan begins; see `tighten`.
     parameters : LocalSearchParameters, optional
     """
     assert search.best is not None
     clock = Clock(search, until_s, search.iteration + iterations)
-    if search.best.evaluation.served_makespan == 0:  # no task that takes time can be served
+    if search.best.evaluation.served_makespan == 0:  # no task with workload can be served
         search.submit(Allocation.idle(search.instance))
         return
     if clock.is_over:
@@ -100,7 +100,7 @@ def _improve(
 
 
 def _improve_endlessly(search: Search, team: Team, parameters: LocalSearchParameters, clock: Clock) -> None:
-    """Alternate between makespan and energy, each turn twice as long as the one before."""
+    """Alternate between makespan and energy in cycles of doubling length."""
     cycle = parameters.first_cycle
     while not clock.is_over:
         MakespanReduction(search, team, parameters).run(Clock(search, until_iteration=search.iteration + cycle))
@@ -111,12 +111,12 @@ def _improve_endlessly(search: Search, team: Team, parameters: LocalSearchParame
 class MakespanReduction:
     """Attempts at target makespans between the lower bound and the best plan, closer to the best after each failure.
 
-    Several threads make the next attempts ahead of time, as if all before failed; most do.
+    Several threads make the next attempts speculatively, assuming that all earlier ones fail, as most do.
 
     Parameters
     ----------
     search : Search
-        It has a plan.
+        A run that has a plan.
     team : Team
     parameters : LocalSearchParameters
     """
@@ -129,10 +129,10 @@ class MakespanReduction:
         self._known: Allocation | None = None
 
     def run(self, clock: Clock, *, patience: float | None = None) -> None:
-        """Go on until the clock ends, from where the last run ended or from a better plan found elsewhere.
+        """Continue until the clock ends, from the end of the last run or from a better plan found elsewhere.
 
-        With `patience`, ends early when the last improvement was that many times as long ago as it took, but not in the
-        first `LEAST_SHARE` of the clock.
+        With `patience`, ends early when the time since the last improvement is that multiple of the time before it, but
+        not in the first `LEAST_SHARE` of the clock.
         """
         search, improved = self._search, 0.0
         assert search.fastest is not None
@@ -153,7 +153,7 @@ class MakespanReduction:
         self._known = search.fastest.allocation
 
     def _attempt(self, clock: Clock, bound: float, best: float) -> None:
-        """Make an attempt by each thread, and choose how the next ones go on."""
+        """Make one attempt in each thread, and choose the target of the next ones."""
         attempts = [self._next_attempt(number, clock, bound, best) for number in range(len(self._team.states))]
         for attempt in self._team.run_all(lambda one: one.run(clock, self._parameters.exchanges), attempts):
             self._search.iteration += attempt.done
@@ -177,7 +177,7 @@ class MakespanReduction:
 
 
 def reduce_energy(search: Search, team: Team, parameters: LocalSearchParameters, clock: Clock) -> None:
-    """Anneal within the makespan of the best plan; what is left of the budget is one cooling cycle."""
+    """Anneal within the makespan of the best plan, in one cooling cycle over the rest of the budget."""
     best, state = search.best, team.states[0]
     assert best is not None
     if clock.is_over or best.evaluation.cost == 0:
@@ -188,7 +188,8 @@ def reduce_energy(search: Search, team: Team, parameters: LocalSearchParameters,
     clock = Clock(search, clock.until_s, clock.until_iteration)
     report, parts = _Reporter(search, state), Parts(team, search.seed)
     final = parameters.final_noise
-    search.iteration += parts.run(parts.count, parameters.exchanges, parameters.weights(state, final, HARD))  # the pace
+    # measures the pace
+    search.iteration += parts.run(parts.count, parameters.exchanges, parameters.weights(state, final, HARD))
     exchanges = parameters.exchanges * clock.iterations_left / search.instance.n
     initial = parameters.initial_noise if plan is None else MOVES_NOISE
     initial *= parameters.noise_reduction(exchanges)
@@ -208,7 +209,8 @@ def reduce_energy(search: Search, team: Team, parameters: LocalSearchParameters,
 class _Reporter:
     """Submits the best plan of an annealing state, at intervals that keep the time for scoring small.
 
-    A plan may be faster than it has to be, and is the fastest then: without a time limit, the intervals are counted.
+    Submitting may change the fastest plan, so without a time limit the intervals are counted in iterations, so that
+    runs are reproducible.
     """
 
     def __init__(self, search: Search, state: AnnealingState) -> None:
@@ -216,7 +218,7 @@ class _Reporter:
         self.submitted_cost, self.next_s, self.next_iteration = np.inf, 0.0, 0
 
     def __call__(self, *, at_once: bool = False) -> None:
-        """Submit the best plan if it is new, and if it is time to or `at_once`."""
+        """Submit the best plan if it is new, and a report is due or `at_once` is set."""
         if self.state.best_cost >= self.submitted_cost or not (at_once or self._is_due()):
             return
         begin = time.monotonic()
@@ -235,14 +237,14 @@ class _Reporter:
 
 
 def repair(search: Search, *, seconds: float) -> None:
-    """Submit plans that keep to the makespan limit and are as near as possible to the plan in force.
+    """Submit plans within the makespan limit that are as close as possible to the plan in force.
 
     Parameters
     ----------
     search : Search
-        Its instance has a price on moves, and its best plan serves the tasks that are to be served.
+        A run on an instance with a price on moves, whose best plan serves all tasks that can be served.
     seconds : float
-        Time for it; at most `REPAIRS_PER_AGENT` are made.
+        Time limit; at most `REPAIRS_PER_AGENT` exchanges per agent are made.
     """
     plan, best, parameters = _plan_in_force(search), search.best, LocalSearchParameters()
     assert plan is not None
@@ -263,13 +265,13 @@ def repair(search: Search, *, seconds: float) -> None:
 
 
 def _plan_in_force(search: Search) -> Allocation | None:
-    """Return the plan from which moves have a price, None where they have none."""
+    """Return the plan in force, from which moves have a price; None if they have none."""
     move, origin = search.instance.reach.move, search.instance.reach.origin
     return None if move is None else only_allowed(search.instance, Allocation(move.task[origin]))
 
 
 def _serving(plan: Allocation, other: Allocation, m: int) -> Allocation:
-    """Return a plan that serves all tasks that another one does, with its agents where `plan` has none."""
+    """Return `plan` with the agents of `other` on those tasks that only `other` serves."""
     task: IntArray = plan.task_of_agent.copy()
     served = np.isin(np.arange(m), task)
     wanted = other.task_of_agent

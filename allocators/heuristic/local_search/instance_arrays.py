@@ -1,4 +1,4 @@
-"""An instance as plain arrays, for the compiled loops."""
+"""An instance as plain arrays for compiled loops."""
 
 from typing import NamedTuple, TypeVar
 
@@ -12,10 +12,10 @@ Int32Array = NDArray[np.int32]
 Array = TypeVar("Array", FloatArray, Int32Array)
 
 TABLE_LIMIT = 2_000_000
-"""Pairs of origin and task up to which distances are tabulated; beyond, each is computed when it is needed."""
+"""Number of pairs of origin and task up to which distances are tabulated; with more, they are computed on demand."""
 
 UNITS = (1.0, 0.5, 0.2, 0.1, 0.05, 0.01, 0.001)
-"""Units in which abilities may be integers, the largest first."""
+"""Units in which abilities may be integers, largest first."""
 
 LARGEST_INTEGER_SUM = 2.0**40
 """Sum of abilities, in units, up to which they are treated as integers."""
@@ -33,17 +33,17 @@ class InstanceArrays(NamedTuple):
     origin : ndarray of int, shape (n,)
         Origin of each agent.
     distance : ndarray, shape (origins, m) or (0, 0)
-        Distances, ``inf`` where a task is out of reach; empty where there are more than `TABLE_LIMIT`.
+        Distances, ``inf`` if a task is out of reach; empty if there are more than `TABLE_LIMIT`.
     cost : ndarray, as `distance`
-        Costs, see `Reach.costs`; the same array where they are distances.
+        Costs, see `Reach.costs`; the same array if costs are distances.
     origin_position, task_position : ndarray, shape (origins, 3) and (m, 3)
-        Coordinates; NaN where unknown.
+        Coordinates; unknown ones are NaN.
     longest_distance, battery : ndarray, shape (origins,)
-        Limits on distance and on energy, tolerance included.
+        Limits on distance and on energy, including a tolerance.
     list_begin, listed_task : ndarray of int, shape (origins + 1,) and (total,)
-        Tasks that agents of each origin may do, sorted, as a compressed sparse row; an empty row allows all tasks.
+        Sorted tasks that agents of each origin may do, as a compressed sparse row; an empty row allows all tasks.
     listed_distance, listed_cost : ndarray, shape (total,) or (0,)
-        Distances and costs of these tasks, which are all within reach, where coordinates do not give them.
+        Distances and costs of these tasks, which are all within reach; empty if coordinates determine them.
     energy_per_distance, ability_unit : float
     integer_ability : bool
         Whether all abilities are integers in `ability_unit`, and travel takes no time.
@@ -99,9 +99,9 @@ def instance_arrays(instance: Instance) -> InstanceArrays:
 
 
 def _read_only(array: Array) -> Array:
-    """Return a view of an array that cannot be written to, as those of an instance and of its neighbours are.
+    """Return a read-only view of an array, as the arrays of an instance and of its neighbours are read-only.
 
-    Others are another type to numba, which would compile all loops anew, within a run.
+    To numba, writable arrays have another type, for which it would compile all loops again during a run.
     """
     view = array.view()
     view.flags.writeable = False
@@ -109,7 +109,7 @@ def _read_only(array: Array) -> Array:
 
 
 def _lists(reach: Reach) -> tuple[NDArray[np.int64], Int32Array, FloatArray, FloatArray]:
-    """Return the lists of tasks by origin, with distances and costs where coordinates do not give them."""
+    """Return the lists of tasks by origin, with distances and costs unless coordinates determine them."""
     none = np.zeros(0)
     if reach.is_plain or len(reach.place) * len(reach.goal) <= TABLE_LIMIT:
         return (*_task_lists(reach), none, none)
@@ -119,7 +119,7 @@ def _lists(reach: Reach) -> tuple[NDArray[np.int64], Int32Array, FloatArray, Flo
     rows = np.diff(near.first)
     if (rows > 0).all():
         return near.first.astype(np.int64), near.task, near.distance, cost
-    # a row without a task gets the task m, which does not exist
+    # a row without tasks gets the task m, which does not exist
     at = near.first[:-1][rows == 0]
     begin = near.first + np.concatenate([[0], np.cumsum(rows == 0)])
     return begin, *(
@@ -128,7 +128,7 @@ def _lists(reach: Reach) -> tuple[NDArray[np.int64], Int32Array, FloatArray, Flo
 
 
 def _task_lists(reach: Reach) -> tuple[NDArray[np.int64], Int32Array]:
-    """Return the lists of tasks by origin, concatenated; one without any task gets the task m, which does not exist."""
+    """Return the concatenated lists of tasks by origin; a list without tasks gets the task m, which does not exist."""
     if not len(reach.lists):
         return np.zeros(len(reach.place) + 1, dtype=np.int64), np.zeros(0, dtype=np.int32)
     no_task, any_task = np.array([len(reach.goal)]), np.zeros(0, dtype=np.intp)

@@ -1,4 +1,4 @@
-"""Moves of agents between groups, and the group abilities, shortfalls and best plan that follow; compiled."""
+"""Compiled moves of agents between groups, with updates of group abilities, shortfalls and the best plan."""
 
 import numpy as np
 
@@ -43,7 +43,7 @@ def recompute(arrays: InstanceArrays, plan: Plan, makespan: float) -> None:
 
 @inlined
 def update_shortfall(plan: Plan, task: int) -> None:
-    """Add a task to the list of those with a shortfall, or remove it."""
+    """Add a task to the list of tasks with a shortfall, or remove it, according to its group ability."""
     position, is_short = plan.short_position[task], plan.group_ability[task] < plan.demand[task]
     if is_short and position < 0:
         plan.short_position[task] = plan.counter[N_SHORT]
@@ -102,7 +102,7 @@ def apply_subset(plan: Plan, work: Workspace, pool: int, subset: np.uint64, task
 
 @inlined
 def save_best(plan: Plan) -> None:
-    """Save the plan as the best so far, writing only what has changed since the last time."""
+    """Save the plan as the best so far, writing only the changes since it was last saved."""
     if plan.counter[N_MOVES] > plan.journal.shape[0]:
         for agent in range(plan.group_of_agent.shape[0]):
             plan.best_group[agent] = plan.group_of_agent[agent]

@@ -8,37 +8,37 @@ from alloc.allocators.heuristic.local_search.annealing_state import AnnealingSta
 from alloc.allocators.heuristic.local_search.plan import Weights
 
 FLIGHTS = 2.6
-"""Mean flights of the current plan that count as much as one to a candidate task, where agents must fly far."""
+"""Factor on the mean flight of the current plan as a unit of noise, if that exceeds the mean flight to a candidate."""
 
 
 @dataclass(frozen=True)
 class LocalSearchParameters(CheckedParameters):
-    """Parameters of local search, tuned on the paper's scenarios with seeds from 1000 on, and on hard instances.
+    """Parameters of local search, tuned on the paper's scenarios with seeds >= 1000, and on hard instances.
 
     Attributes
     ----------
     exchanges : int
-        Exchanges in an iteration; a thousand take about 5 ms.
+        Number of exchanges per iteration; a thousand take about 5 ms.
     neighbours : int
-        Candidate tasks per origin and per task.
+        Number of candidate tasks per origin and per task.
     initial_noise, final_noise : float
         First and last noise on distances, relative to the mean distance to a candidate task.
     short_task_penalty, shortfall_penalty : float
-        Penalty of each task with a shortfall, and of each mean ability that is missing, in mean distances.
+        Penalty of each task with a shortfall, and of a missing ability equal to the mean ability, in mean distances.
     attempt_noise : tuple of float
         Initial noise of successive attempts at a target makespan, relative to the mean ability.
     attempt_final_noise : float
-        Their last noise.
+        Final noise of these attempts.
     attempt_iterations : int
-        Iterations of the first attempt at a target makespan.
+        Number of iterations of the first attempt at a target makespan.
     attempt_growth : float
-        Factor on the iterations of the next attempt after one that failed.
+        Factor on the number of iterations after a failed attempt.
     makespan_share : float
-        Largest share of the budget spent on the makespan where energy counts as well.
+        Largest share of the budget spent on the makespan if energy counts as well.
     first_cycle : int
-        Iterations of the first annealing cycle where the budget is unlimited; each cycle is twice as long.
+        Number of iterations of the first annealing cycle if the budget is unlimited; each cycle is twice as long.
     few_exchanges, many_exchanges : float
-        Exchanges per agent up to which annealing begins at `final_noise`, and from which on at `initial_noise`.
+        Exchanges per agent up to which annealing begins at `final_noise`, and above which it begins at `initial_noise`.
     """
 
     exchanges: int = bounded(1000, low=1)
@@ -63,7 +63,7 @@ class LocalSearchParameters(CheckedParameters):
         ----------
         state : AnnealingState
         noise : float
-            Relative to the mean distance to a candidate task, or to `FLIGHTS` mean flights where those are longer.
+            Relative to the mean distance to a candidate task, or to `FLIGHTS` mean flights if those are longer.
         penalty_factor : float
             Factor on both penalties.
         """
@@ -73,7 +73,7 @@ class LocalSearchParameters(CheckedParameters):
         return state.weights(1.0, noise, self.short_task_penalty * unit, shortfall)
 
     def noise_reduction(self, exchanges: float) -> float:
-        """Return the factor on `initial_noise` where the budget allows so many exchanges per agent."""
+        """Return the factor on `initial_noise` for a budget of `exchanges` per agent."""
         if self.many_exchanges <= self.few_exchanges:
             return 1.0 if exchanges >= self.many_exchanges else self.final_noise / self.initial_noise
         rise = math.log(max(exchanges, 1e-9) / self.few_exchanges) / math.log(self.many_exchanges / self.few_exchanges)

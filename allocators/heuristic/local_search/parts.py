@@ -1,4 +1,4 @@
-"""Annealing by several threads: one plan in parts that change from round to round, or a plan each."""
+"""Annealing by several threads: of parts of one plan, which change from round to round, or of one plan per thread."""
 
 from dataclasses import dataclass
 
@@ -14,44 +14,44 @@ from alloc.problems.evaluation import RELATIVE_TOLERANCE
 from alloc.problems.instance import FloatArray, IntArray
 
 MOST_STATES = 32
-"""Annealing states beyond which further threads are not used."""
+"""Maximum number of annealing states; further threads are not used."""
 
 LEAST_TASKS = 8
-"""Tasks that each part has at least."""
+"""Minimum number of tasks in a part."""
 
 DRAWS = 1.3
-"""Exchanges that are drawn for each one that is to be made: some are with tasks of other parts."""
+"""Number of exchanges drawn per exchange required, as some are with tasks of other parts."""
 
 WHOLE = 8
-"""Exchanges in each part for each one that is then made anywhere in the whole plan."""
+"""Number of exchanges in each part per exchange that is then made in the whole plan."""
 
 RUNS = 2
-"""Runs of each part in a round; longer rounds would settle each part for itself."""
+"""Runs of each part in a round; in longer rounds, each part would converge by itself."""
 
 AGENTS_PER_RUN = 2_000
-"""Agents for each of which a round has one run more: dividing and joining a plan takes time by its size."""
+"""Number of agents per additional run in a round, as the time for dividing and merging a plan grows with its size."""
 
 
 PATIENCE_PER_TASK, LEAST_PATIENCE = 10.0, 10
-"""Exchanges for each task, and least number of iterations, after which an attempt ends if no fewer tasks are short."""
+"""Exchanges per task, and least number of iterations, without fewer short tasks after which an attempt ends."""
 
 MOST_FAILURES = 3
-"""Rounds of attempts in a row without a success, after which other searches take over."""
+"""Number of consecutive rounds of attempts without success after which other searches continue."""
 
 
 @dataclass(frozen=True)
 class Team:
-    """Annealing states of one instance, each with random numbers of its own, and what runs them side by side."""
+    """Annealing states of an instance, each with its own random numbers, and a `map` that runs them concurrently."""
 
     states: list[AnnealingState]
     run_all: RunAll
 
     @classmethod
     def of(cls, search: Search, neighbours: int, run_all: RunAll) -> "Team":
-        """Return a team for the threads of a run; its first state is the one that a single thread has."""
+        """Return a team for the threads of a run; its first state is the same as with a single thread."""
         first = AnnealingState(search.instance, search.seed, neighbours)
-        twins = [first.twin([search.seed, number]) for number in range(1, min(search.threads, MOST_STATES))]
-        return cls([first, *twins], run_all)
+        clones = [first.clone([search.seed, number]) for number in range(1, min(search.threads, MOST_STATES))]
+        return cls([first, *clones], run_all)
 
 
 @dataclass
@@ -66,7 +66,7 @@ class Attempt:
     done: int = 0
 
     def run(self, clock: Clock, exchanges: int) -> "Attempt":
-        """Look for a plan within the target makespan."""
+        """Search for a plan within the target makespan."""
         self.state.set_target(self.makespan)
         for level in self.noise.tolist():
             if clock.is_over or not self.state.n_short:
@@ -81,41 +81,41 @@ class Attempt:
         return not self.state.n_short
 
     def submit(self, search: Search) -> None:
-        """Submit the plan if it may be faster than the fastest."""
+        """Submit the plan if it may be faster than the fastest one."""
         assert search.fastest is not None
         fastest = search.fastest.evaluation.served_makespan
-        # where travel takes time, only the evaluation knows the makespan
+        # with travel times, the makespan is known only after evaluation
         if self.is_reached or not self.state.arrays.instant_travel or self.state.current_makespan < fastest:
             search.submit(self.state.allocation)
 
 
 class Parts:
-    """Anneals the plan of a state in parts, side by side.
+    """Anneals parts of a plan concurrently.
 
-    A part has neighbouring tasks, their agents, and some of the idle ones; exchanges are made within parts. In each
-    round, the tasks are divided along another direction.
+    A part consists of neighbouring tasks, their agents, and some of the idle agents; exchanges are made within parts.
+    In each round, the tasks are divided along a different direction.
 
     Parameters
     ----------
     team : Team
-        The plan is that of its first state.
+        The team, whose first state has the plan.
     seed : int
 
     Attributes
     ----------
     count : int
-        How many parts there are.
+        Number of parts.
     """
 
     def __init__(self, team: Team, seed: int) -> None:
         self.team, self.state, self.rng = team, team.states[0], np.random.default_rng(seed)
         tasks = int(np.count_nonzero(self.state.plan.demand))
         self.count = max(1, min(len(team.states), tasks // LEAST_TASKS))
-        first = [self.state.twin(seed)] if self.count > 1 else []
+        first = [self.state.clone(seed)] if self.count > 1 else []
         self._parts = [*first, *team.states[1 : self.count]]
 
     def run(self, iterations: float, steps: int, weights: Weights) -> int:
-        """Make up to so many iterations of `steps` exchanges each; return how many were made."""
+        """Make up to `iterations` iterations of `steps` exchanges each; return the number made."""
         if self.count == 1:
             self.state.run(steps, weights)
             return 1
@@ -129,7 +129,7 @@ class Parts:
         def work(number: int) -> None:
             parts[number].begin_part(self.state, number, part_of_task, part_of_agent)
             for _ in range(runs):
-                parts[number].run(int(steps * self.count * DRAWS), weights)  # one in `count` agents is in the part
+                parts[number].run(int(steps * self.count * DRAWS), weights)  # one of `count` agents is in the part
 
         list(self.team.run_all(work, range(self.count)))
         self.state.join(parts, part_of_task, part_of_agent)
@@ -137,7 +137,7 @@ class Parts:
         return runs * self.count
 
     def _divide(self) -> tuple[IntArray, IntArray]:
-        """Return the part of each task and of each agent: slabs across a random direction, of about as many agents."""
+        """Return the part of each task and agent: slabs across a random direction with similar numbers of agents."""
         plan, rng, count = self.state.plan, self.rng, self.count
         tasks = np.flatnonzero(plan.demand[:-1] > 0)
         order = tasks[np.argsort(_along(self.state.arrays.task_position[tasks], rng), kind="stable")]
@@ -153,34 +153,34 @@ class Parts:
 
 
 def _along(position: FloatArray, rng: np.random.Generator) -> FloatArray:
-    """Return how far each position lies in a random direction; a random number where it is unknown."""
+    """Return the coordinate of each position along a random direction; a random number if it is unknown."""
     key: FloatArray = position @ rng.standard_normal(position.shape[1])
     return np.where(np.isnan(key), rng.random(len(key)), key)
 
 
 def tighten(search: Search, team: Team, priced: PricedPlan, clock: Clock, exchanges: int) -> None:
-    """Halve the gap of a plan from prices as often as exchanges without noise succeed; submit what they reach.
+    """Halve the gap of a plan from prices as long as exchanges without noise succeed; submit the plans found.
 
-    Noise would undo what prices have evened out. Each attempt begins at the plan of the last success; after a failure,
-    the target is halfway to the fastest. Several threads try such targets ahead of time.
+    Noise would undo what prices have balanced. Each attempt begins with the plan of the last success; after a failure,
+    the target moves halfway to the fastest makespan. Several threads try such targets speculatively.
 
     Parameters
     ----------
     search : Search
-        It has a plan.
+        A run that has a plan.
     team : Team
     priced : PricedPlan
-        Its prices are those of shortfalls in the beginning of each attempt.
+        Its prices are the initial prices of shortfalls in each attempt.
     clock : Clock
     exchanges : int
-        In an iteration.
+        Number of exchanges per iteration.
     """
     plan, count = priced.allocation, len(team.states)
     patience = max(LEAST_PATIENCE, int(PATIENCE_PER_TASK * search.instance.m / exchanges))
     fraction, failures = 0.5, 0
 
     def attempt(number: int) -> int:
-        """Try a target from the plan, and return how many iterations that took."""
+        """Try a target makespan, beginning with the plan, and return the number of iterations."""
         state, waited, done = team.states[number], 0, 0
         state.begin(plan, targets[number], priced.price)
         least, most = state.n_short, clock.iterations_of(number, count)

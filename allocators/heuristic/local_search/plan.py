@@ -1,4 +1,4 @@
-"""The plan of a search, its workspace and its weights, as arrays that compiled loops change in place."""
+"""The plan of a search, its workspace and weights, as arrays that compiled loops change in place."""
 
 from typing import NamedTuple
 
@@ -9,67 +9,67 @@ from alloc.allocators.heuristic.local_search.instance_arrays import Int32Array
 from alloc.problems.instance import FloatArray
 
 POOL_BY_SUMS = 32
-"""Agents in one exchange where sums of abilities are integers."""
+"""Maximum number of agents in an exchange if sums of abilities are integers."""
 
 POOL_ENUMERATED = 12
-"""Agents in one exchange where all subsets are enumerated."""
+"""Maximum number of agents in an exchange if all subsets are enumerated."""
 
 POOL_TRAVELLING = 8
-"""The same where travel takes time, so that abilities depend on the task: cheap exchanges, and many of them."""
+"""The same with travel times, with which abilities depend on the task: cheap exchanges, but many of them."""
 
 POOL_BY_HALVES = 16
-"""Agents in one exchange by meeting in the middle; the subsets of both halves must fit into the workspace."""
+"""Maximum number of agents in an exchange by meeting in the middle; subsets of both halves fit into the workspace."""
 
 NOISE_SIZE = 4096
-"""Random numbers that are drawn beforehand."""
+"""Number of random numbers that are drawn in advance."""
 
 MOST_SUMS = 1 << 14
-"""Sums of abilities that the dynamic programme distinguishes."""
+"""Maximum number of sums of abilities in the dynamic programme."""
 
 N_SHORT, N_MOVES, FULL_GROUP, N_LOGGED = 0, 1, 2, 3
 """Entries of `Plan.counter`."""
 
 LOG_SIZE = 512
-"""Last moves that are kept: those of the longest ejection chain, and those that take it back; a power of two."""
+"""Number of last moves that are logged, enough for the longest ejection chain and its undoing; a power of two."""
 
 MOST_TOUCHED = 8
-"""Groups that an ejection chain changes, at most."""
+"""Maximum number of groups that an ejection chain changes."""
 
 CURRENT, BEST = 0, 1
 """Entries of `Plan.cost`."""
 
 
 class Plan(NamedTuple):
-    """One allocation; the idle agents are group m.
+    """An allocation; group m consists of the idle agents.
 
     Attributes
     ----------
     group_of_agent : ndarray of int, shape (n,)
         Task of each agent, or m.
     slot : ndarray of int
-        Members of all groups, with free slots behind those of each group.
+        Members of all groups, each followed by free slots.
     begin : ndarray of int, shape (m + 2,)
-        Where the slots of each group begin.
+        Index where the slots of each group begin.
     size : ndarray of int, shape (m + 1,)
-        Members of each group.
+        Number of members of each group.
     position : ndarray of int, shape (n,)
         Index of each agent within its group.
     demand, group_ability : ndarray, shape (m + 1,)
-        Ability that each task needs to be done within the target makespan, and that its group has.
+        Ability that each task needs to meet the target makespan, and that its group has.
     price : ndarray, shape (m + 1,)
-        Factor on the penalty of each unit of ability that a task lacks; rises while a task is short.
+        Factor on the penalty of each unit of missing ability; rises while a task is short.
     short_task, short_position : ndarray of int, shape (m,)
-        List of the tasks whose group ability is below their demand, and the position of each task on it, -1 for none.
+        List of the tasks whose group ability is below their demand, and the index of each task in it, -1 for none.
     best_group, journal : ndarray of int, shape (n,)
         The best assignment so far, and the agents that have moved since it was saved.
     moved, source : ndarray of int, shape (LOG_SIZE,)
-        Log of the last moves, in a ring: agents, and the groups that they left.
+        Log of the last moves, as a ring buffer: agents, and the groups that they left.
     counter : ndarray of int, shape (4,)
         Tasks with a shortfall; moves since the best was saved; whether a group has run out of slots; moves in the log.
     cost : ndarray, shape (2,)
-        Total cost of flights, of this plan and of the best.
+        Total cost of flights of this plan and of the best.
     random : ndarray of uint64, shape (1,)
-        State of the random numbers.
+        State of the random number generator.
     """
 
     group_of_agent: Int32Array
@@ -92,22 +92,22 @@ class Plan(NamedTuple):
 
 
 class Workspace(NamedTuple):
-    """Buffers of one exchange between a task and another one, and logistic noise.
+    """Buffers of an exchange between two tasks, and logistic noise.
 
     Attributes
     ----------
     agent : ndarray of int
-        The pool: agents that are reassigned.
+        The pool of agents that are reassigned.
     ability, other_ability : ndarray
-        What each contributes to the task, and to the other one.
+        Contribution of each agent to the first and to the other task.
     extra_cost, cost : ndarray
-        By how much the flight to the task costs more than that to the other one, as it is, and weighted with noise.
+        Cost of the flight to the first task minus that to the other one, and the same weighted and with noise.
     sum_cost, sum_set : ndarray, shape (2 * MOST_SUMS,)
-        Least cost for each sum of abilities, and a subset that has it, as bits; two rows of the dynamic programme.
+        Least cost for each sum of abilities, and a subset that attains it, as bits; two rows of the dynamic programme.
     subset_ability, subset_other_ability, subset_cost, subset_bits : ndarray
         Subsets of the pool, or of its halves.
     touched, touched_ability, touched_penalty : ndarray
-        Groups that an ejection chain changes, with their abilities and penalties before.
+        Groups that an ejection chain changes, with their previous abilities and penalties.
     logistic : ndarray, shape (NOISE_SIZE,)
     """
 
@@ -134,13 +134,13 @@ class Weights(NamedTuple):
     Attributes
     ----------
     cost, noise : float
-        Of the cost of flights, and of the noise on the cost of each agent.
+        Weights of the cost of flights, and of the noise on the cost of each agent.
     short_task, shortfall : float
-        Penalty of each task with a shortfall, and of each unit of ability that is missing.
+        Penalties of each task with a shortfall, and of each unit of missing ability.
     surplus : float
         Ability beyond the demand up to which sums are considered.
     integer_ability : float
-        The largest ability where abilities are integers, else ``inf``.
+        The largest ability if abilities are integers, else ``inf``.
     """
 
     cost: float
@@ -152,14 +152,14 @@ class Weights(NamedTuple):
 
 
 class Needs(NamedTuple):
-    """What two tasks lack without the agents of the pool, and what it costs; the second may be the idle agents.
+    """Shortfalls of two tasks without the agents of the pool, and their prices; the second may be the idle agents.
 
     Attributes
     ----------
     missing, other_missing : float
-        Ability that each lacks.
+        Missing ability of each task.
     price, other_price : float
-        Factor on the penalty of each unit, see `Plan.price`.
+        Factor on the penalty of each unit of missing ability, see `Plan.price`.
     all_in_pool, other_all_in_pool : bool
         Whether all agents of a task are in the pool, so that it may become unserved.
     """
@@ -190,7 +190,7 @@ def group_slots(
 
 
 def idle_plan(n: int, m: int, random: NDArray[np.uint64]) -> Plan:
-    """Return a plan in which all agents are idle, without slots yet."""
+    """Return a plan in which all agents are idle, without slots."""
     int32 = np.int32
     return Plan(
         group_of_agent=np.full(n, m, dtype=int32),
@@ -214,7 +214,7 @@ def idle_plan(n: int, m: int, random: NDArray[np.uint64]) -> Plan:
 
 
 def workspace(seed: int | list[int]) -> Workspace:
-    """Return buffers for exchanges, with noise from `seed`."""
+    """Return buffers for exchanges, with noise drawn with `seed`."""
     uniform = np.random.default_rng(seed).uniform(1e-9, 1 - 1e-9, NOISE_SIZE)
     ability, other_ability, extra_cost, cost = (np.empty(2 * POOL_BY_SUMS) for _ in range(4))
     subset_ability, subset_other_ability, subset_cost = (np.empty(1 << POOL_ENUMERATED) for _ in range(3))

@@ -1,7 +1,7 @@
-"""The cheapest subset of a pool of agents for one of two tasks, the rest being for the other; compiled.
+"""Compiled searches for the cheapest subset of a pool of agents for one of two tasks; the other task gets the rest.
 
-A subset is a bit mask over the pool. Its cost is that of its agents (`Workspace.cost`) and the penalties of both tasks'
-shortfalls, which follow from their `Needs`.
+A subset is a bit mask over the pool. Its cost is that of its agents (`Workspace.cost`) plus the penalties of the
+shortfalls of both tasks, which are computed from their `Needs`.
 """
 
 import numpy as np
@@ -10,13 +10,13 @@ from alloc.allocators.heuristic.local_search.plan import MOST_SUMS, POOL_BY_HALV
 from alloc.allocators.runtime.compiled import compiled
 
 UNSERVED_PENALTY = 1e12
-"""Penalty of a task without any agent, larger than all others."""
+"""Penalty of a task without agents, larger than all others."""
 
 LOOKAHEAD = 8
-"""Subsets of the second half that are considered for each of the first, from the smallest that suffices on."""
+"""Number of subsets of the second half considered for each subset of the first, from the smallest sufficient one."""
 
 UNREACHABLE = 1e300
-"""Cost of a sum of abilities that no subset has."""
+"""Cost of a sum of abilities that no subset attains."""
 
 
 @compiled
@@ -38,8 +38,8 @@ def best_by_sums(
 ) -> np.uint64:
     """Return the cheapest subset by dynamic programming over integer sums of abilities.
 
-    For each sum up to `largest_sum`, the cheapest subset of the first k agents is known, for growing k. Indices are
-    unsigned, which spares the compiler checks for negative ones.
+    For increasing k, the cheapest subset of the first k agents is computed for each sum up to `largest_sum`. Indices
+    are unsigned, which avoids checks for negative indices.
     """
     missing, other_missing, price, other_price, all_in_pool, other_all_in_pool = needs
     cost, sets, sizes, costs = work.sum_cost, work.sum_set, work.ability, work.cost
@@ -128,10 +128,10 @@ def sorted_subsets(work: Workspace, begin: int, count: int, base: int) -> int:
 
 @compiled
 def best_by_halves(work: Workspace, weights: Weights, pool: int, needs: Needs) -> np.uint64:
-    """Return the cheapest of the subsets that barely suffice, by meeting in the middle.
+    """Return the cheapest of the subsets that just suffice, by meeting in the middle.
 
-    With the subsets of both halves of the pool sorted, the subsets of the second half that complete each of the first
-    are found in one pass.
+    The subsets of both halves of the pool are sorted; those of the second half that complete each subset of the first
+    are then found in one pass.
 
     References
     ----------

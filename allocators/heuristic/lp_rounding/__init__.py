@@ -1,1 +1,1 @@
-"""A linear relaxation over classes of agents, rounded."""
+"""Rounding of a linear relaxation over classes of agents."""

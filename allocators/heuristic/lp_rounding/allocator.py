@@ -1,4 +1,4 @@
-"""Linear relaxation over classes of agents, rounded by a matching, and repaired by local search."""
+"""The method `lp-round`: a linear relaxation over classes of agents, rounded by matching, repaired by local search."""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -19,24 +19,24 @@ from alloc.problems import Allocation, Instance, Objective, serve_all
 from alloc.problems.bounds import LP_PAIRS_PER_SECOND, LP_SIZE_LIMIT
 
 UNHURRIED_S = 10.0
-"""Time limit that `LpRound.refusal` assumes where there is none."""
+"""Time limit in seconds that `LpRound.refusal` assumes if there is none."""
 
 
 @dataclass(frozen=True)
 class LpRoundParameters(CheckedParameters):
-    """Parameters of rounding, of repair, and of the local search after them.
+    """Parameters of the rounding, the repair, and the subsequent local search.
 
     Attributes
     ----------
     makespan_excess : tuple of float
-        Target makespans, tried in this order until one is met: relative excess over the least fractional makespan.
+        Target makespans, as relative excess over the least fractional makespan, tried in order until one is met.
     repair_iterations : int
-        Most iterations of local search for each target.
+        Maximum number of iterations of local search for each target.
     repair_noise, repair_final_noise : float
         First and last noise of the repair, relative to the mean distance to a candidate task; far below that of
-        `local-search`, so that most of the rounded allocation stays as it is.
+        `local-search`, so that most of the rounded allocation is kept.
     initial_noise : float
-        First noise of the local search in the rest of the budget, where energy counts.
+        First noise of the local search in the rest of the budget, if energy counts.
     time_share : float
         Largest share of the remaining time that one linear programme may take.
     """
@@ -50,12 +50,13 @@ class LpRoundParameters(CheckedParameters):
 
 
 class LpRound(Allocator):
-    """Relax, round and repair.
+    """Linear relaxation, rounding and repair.
 
-    A linear programme distributes fractions of agents so that the makespan is least; where energy counts, a second one
-    minimises the distance within it. Its vertices have few fractions, which are rounded by the matching of Shmoys and
-    Tardos: no task loses more than one agent. Exchanges of the local search then restore what is missing, at a slightly
-    larger makespan if necessary, and use the rest of the budget. An iteration is one of the local search.
+    A linear programme distributes fractions of agents so that the makespan is minimal; if energy counts, a second one
+    minimises the distance within that makespan. Vertices have few fractional values, which are rounded by the matching
+    of Shmoys and Tardos, so that no task loses more than one agent. Exchanges of the local search then repair
+    shortfalls, at a slightly larger makespan if necessary, and use the rest of the budget. An iteration is one of the
+    local search.
 
     Parameters
     ----------
@@ -81,13 +82,13 @@ class LpRound(Allocator):
         compile_loops()
 
     def refusal(self, instance: Instance, objective: Objective, budget: Budget) -> str | None:
-        """Refuse linear programmes that do not fit into the budget: stopped early, they give no answer."""
+        """Refuse linear programmes that do not fit into the budget, as they give no answer if stopped early."""
         seconds = UNHURRIED_S if budget.time_limit_s is None else max(1.0, budget.time_limit_s)
         most = min(LP_SIZE_LIMIT, int(LP_PAIRS_PER_SECOND * seconds))
         classes = len(np.unique(instance.ability)) * (len(instance.reach.place) if objective != "makespan" else 1)
         pairs = min(instance.n, classes) * instance.m if not instance.has_travel_time else instance.n * instance.m
         if pairs > most:
-            return f"a linear programme of up to {pairs} pairs of agents and tasks; in this time it can solve {most}"
+            return f"the linear programme has up to {pairs} pairs of agents and tasks; in this time it can solve {most}"
         return None
 
     def allocate(self, search: Search) -> Proposal:

@@ -1,4 +1,4 @@
-"""The linear relaxation of allocation: fractions of agents per class and task, by HiGHS."""
+"""The linear relaxation of the allocation problem, with fractions of agents per class and task, solved by HiGHS."""
 
 import numpy as np
 from scipy.sparse import csr_array, hstack, vstack
@@ -11,10 +11,10 @@ from alloc.problems.bounds import scale_to_one, typical_distance
 from alloc.problems.instance import FloatArray
 
 SAFETY = 1e-9
-"""Relative amount by which a makespan is raised above the optimum of the relaxation, to be feasible in floats."""
+"""Relative amount added to the optimal makespan of the relaxation, so that it is feasible in floating point."""
 
 MOST_STEPS = 8
-"""Linear programmes for the least fractional makespan; one is enough where travel takes no time."""
+"""Maximum number of linear programmes for the least fractional makespan; one is enough without travel times."""
 
 
 class Relaxation:
@@ -24,7 +24,7 @@ class Relaxation:
     ----------
     instance : Instance
     by_place : bool
-        Whether classes distinguish agents by their location, which energy requires.
+        Whether classes distinguish agents by their position, as required for energy.
     time_share : float
         Largest share of the remaining time that one linear programme may take.
     """
@@ -42,14 +42,14 @@ class Relaxation:
         self.used = csr_array((ones, (self.agent_class, columns)), shape=(self.classes.size, len(columns)))
 
     def task_share(self, makespan: float) -> FloatArray:
-        """Return the share of its task that one agent of each pair completes within a makespan, at most 1."""
+        """Return the share of the task that an agent of each pair completes within a makespan, at most 1."""
         with np.errstate(over="ignore", invalid="ignore"):
             hours_on_task = np.maximum(0.0, makespan - self.distance / self.classes.speed[self.agent_class])
             done = self.classes.ability[self.agent_class] * hours_on_task / self.instance.workload[self.task]
         return np.minimum(1.0, np.nan_to_num(done, nan=0.0))
 
     def least_makespan(self, search: Search) -> float | None:
-        """Return approximately the least makespan of a fractional allocation in hours, None if there was no answer."""
+        """Return approximately the least makespan of a fractional allocation in hours, or None without an answer."""
         makespan = search.lower_bound
         for _ in range(MOST_STEPS):
             matrix = vstack(
@@ -62,14 +62,14 @@ class Relaxation:
             answer = _minimise(search, np.append(np.zeros(len(self.task)), -1.0), matrix, limits, self.time_share)
             completed = 0.0 if answer is None else -answer.value
             if completed <= 0:
-                return None  # some task is out of reach, or there was no time
+                return None  # a task is out of reach, or time ran out
             if completed >= 1 - SAFETY:
                 return makespan * (1 + SAFETY)
             makespan /= completed
         return makespan
 
     def rounded(self, search: Search, makespan: float) -> Allocation | None:
-        """Return a fractional allocation of least cost within a makespan, rounded; None if there was no answer."""
+        """Return a rounded fractional allocation of least cost within a makespan, or None without an answer."""
         share = self.task_share(makespan)
         rng = np.random.default_rng(search.seed)
         scaled = self.flight_cost * scale_to_one(typical_distance(self.flight_cost))

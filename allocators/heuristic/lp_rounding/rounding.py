@@ -1,4 +1,4 @@
-"""Rounding of fractional allocations: floors, then a matching of the remaining agents with slots of the tasks."""
+"""Rounding of fractional allocations: integer parts are kept, and the remaining agents matched with slots of tasks."""
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
@@ -6,32 +6,32 @@ from scipy.optimize import linear_sum_assignment
 from alloc.problems.instance import FloatArray, IntArray
 
 CLOSE = 1e-7
-"""Distance from an integer that is a rounding error of the solver."""
+"""Distance from an integer up to which a value counts as that integer."""
 
 
 def round_fractions(
     agent_class: IntArray, task: IntArray, amount: FloatArray, share: FloatArray, cost: FloatArray, count: IntArray
 ) -> IntArray:
-    """Round a fractional allocation so that no task loses more than one agent, that with the largest share.
+    """Round a fractional allocation so that no task loses more than one agent, at most that with the largest share.
 
-    Integer parts are kept. The fractions on each task, largest share first, fill slots of one agent each; every slot
-    but the last is full, so that there is a matching of slots with agents that costs no more than the fractions.
+    Integer parts are kept. The fractions on each task, largest share first, fill slots of one agent each; all slots
+    except the last are full, so that there is a matching of slots with agents that costs no more than the fractions.
 
     Parameters
     ----------
     agent_class, task : ndarray of int, shape (p,)
         Class of agents and task of each pair.
     amount : ndarray, shape (p,)
-        Agents of the class on the task, >= 0.
+        Number of agents of the class on the task, >= 0.
     share, cost : ndarray, shape (p,)
         Share of the task that one such agent completes, and its cost.
     count : ndarray of int, shape (k,)
-        Agents in each class.
+        Number of agents in each class.
 
     Returns
     -------
     ndarray of int, shape (p,)
-        Agents of the class on the task.
+        Number of agents of the class on the task.
 
     References
     ----------
@@ -46,7 +46,7 @@ def round_fractions(
     agent = np.repeat(np.arange(len(count)), copies)
     if not len(pair) or not len(agent):
         return integer
-    reward = 1.0 + 2 * len(pair) * float(np.abs(cost[pair]).max())  # more than all costs: a filled slot comes first
+    reward = 1.0 + 2 * len(pair) * float(np.abs(cost[pair]).max())  # exceeds all costs, as filling slots has priority
     full = np.bincount(slot, weights=part) > 1 - 2 * CLOSE  # all of these can be filled at once, and must be
     matrix = np.zeros((slot.max() + 1, len(count)))
     lookup = np.full(matrix.shape, -1, dtype=np.intp)

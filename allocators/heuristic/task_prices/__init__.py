@@ -1,1 +1,1 @@
-"""Prices of tasks for large instances: a bound on the makespan, and plans that keep close to it."""
+"""Prices of tasks for large instances, which give a bound on the makespan and plans close to it."""

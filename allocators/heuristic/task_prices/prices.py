@@ -1,7 +1,7 @@
-"""Prices of tasks at which supply meets demand, and the bound on the makespan that they prove.
+"""Prices of tasks that balance supply and demand, and the bound on the makespan that they prove.
 
-By weak duality of the linear programme of single agents: if the value of all agents together, each on the task where it
-has the most, is less than that of all workloads, no plan does all work in time.
+The bound follows from weak duality of the linear programme over single agents: if the total value of the agents, each
+on the task where its value is highest, is less than that of all workloads, no plan completes all work in time.
 """
 
 import time
@@ -25,52 +25,52 @@ from alloc.problems import Instance
 from alloc.problems.instance import FloatArray, IntArray
 
 COARSE = ((5, (*(12 * ((0.25, 6),)), *(12 * ((0.12, 6),)))), (25, 5 * ((0.1, 6),)))
-"""Samples by agents for each task; for each, widths of the smoothing relative to the spread of values, and the most
-iterations with each. Over long ways prices even out slowly, which takes many iterations, so that these have few agents.
-After more iterations at once prices may run away where agents reach more tasks than a shortlist has.
+"""Samples, by number of agents per task; for each, widths of the smoothing relative to the spread of values, and the
+maximum number of iterations with each. Over long distances, prices converge slowly, in many iterations, so that the
+samples are small. With more iterations at a time, prices may diverge if agents reach more tasks than a shortlist holds.
 """
 
 FINE = ((0.025, 35), (0.0125, 25))
-"""The same for all agents."""
+"""Widths and iterations for all agents."""
 
 LEAST_SPREAD = 1e-3
-"""Spread of values where travel takes hardly any time."""
+"""Least spread of values, for instances with negligible travel times."""
 
 COARSE_LENGTH, FINE_LENGTH = 32, 12
-"""Tasks on the shortlists of each."""
+"""Number of tasks on the shortlists for samples and for all agents."""
 
 SAFETY = 1e-9
-"""Part by which a bound is lowered: rounding of a million terms."""
+"""Relative amount by which a bound is lowered, against rounding errors of a million terms."""
 
 PROMISING = 1e-5
-"""Part by which a bound may be too low before the agents are looked at once more for its sake."""
+"""Relative amount by which a bound may be too low before all agents are evaluated again."""
 
 CORRECTIONS = 20
-"""Steps from which the quasi-Newton method knows the curvature."""
+"""Number of steps from which the quasi-Newton method estimates the curvature."""
 
 LEAST_SLOPE = 1e-4
-"""Slope by the price of a task, relative to the mean share of a task in the value, at which prices are good enough."""
+"""Gradient component, relative to the mean share of a task in the value, up to which prices count as converged."""
 
 LARGEST_EXPONENT = 50.0
-"""Of a price, below the highest."""
+"""Largest difference of logarithms between the highest and any other price."""
 
 
 class Bidders:
-    """Some agents, and the tasks where they have the most value.
+    """Agents with their shortlists of the tasks on which they have the most value.
 
     Parameters
     ----------
     instance : Instance
     tree : Tree
-        Of its tasks with workload.
+        Tree over the tasks with workload.
     chosen : ndarray of int
         The agents.
     ability : ndarray
-        Their abilities, with those of the agents that they stand for.
+        Their abilities, including those of the agents that they represent.
     length : int
-        Tasks on each shortlist.
+        Number of tasks on each shortlist.
     run_all : callable
-        What runs calls side by side.
+        A `map` that makes its calls concurrently.
     threads : int
     """
 
@@ -94,7 +94,7 @@ class Bidders:
         self._parts = list(pairwise(cut))
 
     def renew(self, price: FloatArray, makespan: float) -> float:
-        """Fill the shortlists at these prices; return the value of all agents per hour of `makespan`."""
+        """Fill the shortlists for these prices; return the total value of the agents per hour of `makespan`."""
         self.makespan = makespan
         agents = self._agents._replace(horizon=makespan * self._speed)
         highest = np.zeros(len(self._tree.begin))
@@ -106,7 +106,7 @@ class Bidders:
         return sum(self._run_all(work, self._parts))
 
     def value(self, price: FloatArray, makespan: float, width: float) -> tuple[float, float, FloatArray]:
-        """Return the value on shortlists, smoothed and as it is, and the smoothed one by task; see `smooth_value`."""
+        """Return the value on shortlists, smoothed and exact, and the smoothed value by task; see `smooth_value`."""
 
         def work(part: tuple[int, int]) -> tuple[float, float, FloatArray]:
             share = np.zeros(len(price))
@@ -123,22 +123,22 @@ class TaskPrices:
     Parameters
     ----------
     instance : Instance
-        With at least one task that has workload.
+        An instance with at least one task that has workload.
     low : float
         A proven bound on the makespan, > 0, in hours.
     run_all : callable
-        What runs calls side by side.
+        A `map` that makes its calls concurrently.
     threads : int
 
     Attributes
     ----------
     bound : float
-        A proven bound on the makespan.
+        A proven bound on the makespan, in hours.
     makespan : float
-        The least makespan of a fractional allocation, about.
+        Estimate of the least makespan of a fractional allocation, in hours.
     price : ndarray, shape (m,)
     bidders : Bidders or None
-        All agents, once `improve` has found that prices help.
+        All agents, as soon as `improve` has found that prices help.
 
     References
     ----------
@@ -158,7 +158,7 @@ class TaskPrices:
     def improve(self, end: float, stopped: Callable[[], bool]) -> bool:
         """Improve the prices until `end` on the monotonic clock; return whether they raised the bound.
 
-        Ends early where the coarse prices of a sample promise nothing.
+        Ends early if the prices from samples do not raise the bound.
         """
 
         def is_over() -> bool:
@@ -181,7 +181,7 @@ class TaskPrices:
                 self._renew(sample)
         if is_over() or self.makespan <= before * (1 + SAFETY):
             return False
-        everyone = self.look_at_all()
+        everyone = self.evaluate_all()
         for width, iterations in FINE:
             if is_over():
                 break
@@ -189,8 +189,8 @@ class TaskPrices:
             self._prove(everyone)
         return self.bound > before * (1 + SAFETY)
 
-    def look_at_all(self) -> Bidders:
-        """Let all agents bid at the present prices, and raise the bound by what that proves; return them."""
+    def evaluate_all(self) -> Bidders:
+        """Evaluate all agents at the current prices, raise the bound accordingly, and return them."""
         everyone = self.bidders = self._bidders(np.arange(self.instance.n), self.instance.ability, FINE_LENGTH)
         self._prove(everyone)
         return everyone
@@ -199,29 +199,29 @@ class TaskPrices:
         return Bidders(self.instance, self._tree, chosen, ability, length, self._run_all, self._threads)
 
     def _renew(self, bidders: Bidders) -> float:
-        """Renew the shortlists; return the makespan at which the value of the agents is that of all workloads."""
+        """Refill the shortlists; return the makespan at which the value of the agents equals that of all workloads."""
         value = bidders.renew(self.price, self.makespan)
         hours = float(self.price @ self.instance.workload) / max(value, 1e-300)
         before, self.makespan = self.makespan, max(self.bound, hours)
         return min(before, hours)
 
     def _prove(self, everyone: Bidders) -> None:
-        """Raise the bound; the value of agents by T is convex and 0 at 0: below T, it falls at least in proportion."""
+        """Raise the bound: the value of agents is convex in T and 0 at 0, so it falls at least in proportion to T."""
         proven = self._renew(everyone)
         if self.makespan > proven * (1 + PROMISING):
             proven = max(proven, self._renew(everyone))
         self.bound = max(self.bound, proven * (1 - SAFETY))
         if proven > self._most_proven:
             self._most_proven, self._best_price = proven, self.price
-        elif self.price is not self._best_price:  # smoothed values are not the values themselves
+        elif self.price is not self._best_price:  # the smoothed optimum may be worse in exact values
             self.price = self._best_price
             self._renew(everyone)
 
     def _adjust(self, bidders: Bidders, width: float, iterations: int, is_over: Callable[[], bool]) -> None:
-        """Adjust the prices by some iterations of the quasi-Newton method."""
+        """Adjust the prices by up to `iterations` iterations of the quasi-Newton method."""
         from scipy.optimize import minimize
 
-        if not (bidders.lists.task[:, 0] >= 0).any():  # no agent of the sample reaches a task by then
+        if not (bidders.lists.task[:, 0] >= 0).any():  # no agent of the sample reaches a task in time
             return
         work, some = self.instance.workload, self._some
         unit = width * np.sqrt(work[some].mean() / work[some])  # the curvature grows with the workload

@@ -1,8 +1,8 @@
-"""Regions of tasks whose prices rise and fall together: variables by which prices even out over long ways.
+"""Regions of tasks whose prices change together: variables that make prices converge over long distances.
 
-Agents can do near tasks alone. With a variable for each task, a quasi-Newton method passes a lack of agents on from
-task to task, and needs many iterations for a long way; with one for each region of each size besides, it needs few (a
-multilevel preconditioner).
+Agents can do only near tasks. With one variable per task, a quasi-Newton method propagates a shortage of agents from
+task to task, and needs many iterations over long distances; with additional variables for regions of all sizes, it
+needs few (a multilevel preconditioner).
 
 References
 ----------
@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
 EXPONENT = -0.25
-"""Of the number of tasks in a region, as the weight of its variable: in a plane, the curvature of the dual along a
-factor on the prices of a region grows with the length of its border."""
+"""Exponent of the number of tasks in a region in the weight of its variable: in a plane, the curvature of the dual
+along a common factor on the prices of a region grows with the length of its border."""
 
 
 def regions_of(tree: Tree) -> "csr_array":
@@ -30,7 +30,7 @@ def regions_of(tree: Tree) -> "csr_array":
     Parameters
     ----------
     tree : Tree
-        Over the tasks that have prices; each of its nodes with two or more tasks is a region.
+        Tree over the tasks that have prices; each node with two or more tasks is a region.
 
     Returns
     -------

@@ -1,7 +1,7 @@
-"""A plan from prices of tasks: agents do tasks where they have nearly the most value, and little is missing.
+"""A plan from prices of tasks, in which agents do tasks with nearly their highest value, and shortfalls are small.
 
-First, agents that prefer one task get it, and those that hardly care go where most is missing. Then each agent in turn
-changes to the task to which it brings most, counted by price and by how much is missing there.
+First, agents with a clear preference get their best task, and nearly indifferent ones go to tasks with the largest
+shortfalls. Then each agent in turn changes to the task of highest utility, given the prices and shortfalls.
 """
 
 from collections.abc import Callable, Iterator
@@ -15,35 +15,35 @@ from alloc.allocators.runtime.compiled import compiled
 from alloc.problems import IDLE, Allocation
 
 FREE = 0.3
-"""Part of the agents that go where they are needed most among tasks where they have nearly the most value."""
+"""Share of the agents that are assigned by shortfall among tasks where they have nearly their highest value."""
 
 SLACK = 0.001
-"""Part by which the makespan aimed at exceeds that of a fractional allocation: whole agents leave some ability over."""
+"""Relative excess of the target makespan over that of a fractional allocation, as whole agents waste some ability."""
 
 WIDTHS = (0.02, 0.01, 0.005)
-"""Excess of work done, as a part of a task's workload, that divides the utility of more by e; for each pass."""
+"""Excess work, as a share of a task's workload, that divides the utility of further work by e; one value per pass."""
 
 LARGEST_EXPONENT = 300.0
-"""Of the factor on the utility of a task that has no agent yet."""
+"""Largest exponent of the factor on the utility of a task, for tasks without agents."""
 
 SLICE = 65_536
-"""Agents that compiled code looks at between two checks of the clock."""
+"""Number of agents that compiled code processes between two checks of the clock."""
 
 
 def rounded(prices: TaskPrices, stopped: Callable[[], bool] = lambda: False) -> Allocation:
-    """Return a plan in which each agent does a task where it has nearly the most value.
+    """Return a plan in which each agent does a task on which it has nearly its highest value.
 
     Parameters
     ----------
     prices : TaskPrices
-        With bidders.
+        Prices with bidders.
     stopped : callable
-        Checked now and then; once it is true, agents stay where they are, or idle.
+        Checked periodically; when it returns true, agents keep their tasks, or stay idle.
 
     References
     ----------
-    Exponential potential: Plotkin, Shmoys and Tardos (1995), doi:10.1287/moor.20.2.257. That agents which improve a
-    potential in turn come to an end: Monderer and Shapley (1996), doi:10.1006/game.1996.0044.
+    Exponential potential: Plotkin, Shmoys and Tardos (1995), doi:10.1287/moor.20.2.257. Convergence of agents that
+    improve a potential in turn: Monderer and Shapley (1996), doi:10.1006/game.1996.0044.
     """
     bidders, instance = prices.bidders, prices.instance
     assert bidders is not None
@@ -68,7 +68,7 @@ def rounded(prices: TaskPrices, stopped: Callable[[], bool] = lambda: False) -> 
 
 
 def _slices(order: Indices, stopped: Callable[[], bool]) -> Iterator[Indices]:
-    """Yield the agents in parts, until that is to stop."""
+    """Yield slices of the agents until `stopped` returns true."""
     for begin in range(0, len(order), SLICE):
         if stopped():
             return
@@ -77,7 +77,7 @@ def _slices(order: Indices, stopped: Callable[[], bool]) -> Iterator[Indices]:
 
 @compiled
 def find_regrets(lists: Shortlists, scale: float, price: Floats, regret: Floats) -> None:
-    """Set the part of its value that each agent loses on its second-best task."""
+    """Set the share of its value that each agent loses on its second-best task."""
     for agent in range(len(regret)):
         best, second = 0.0, 0.0
         for k in range(lists.task.shape[1]):
@@ -103,20 +103,20 @@ def assign(
     done: Floats,
     entry: Indices,
 ) -> None:
-    """Assign agents with more than the `least` regret to their best tasks, or the others where most is missing.
+    """Assign agents with more than the `least` regret to their best tasks, or the others by the largest shortfall.
 
     Parameters
     ----------
     chosen : ndarray of int
-        Agents, the ablest first.
+        Agents by decreasing ability.
     is_free : bool
-        Whether the others are meant.
+        Whether to assign the others.
     need : ndarray, shape (m,)
         Ability that each task needs.
     done : ndarray, shape (m,)
-        Ability on each task, less what is lost on the way; changed in place.
+        Ability on each task, reduced by travel times; changed in place.
     entry : ndarray of int, shape (n,)
-        Where the task of each agent stands on its shortlist; changed in place.
+        Index of the task of each agent on its shortlist; changed in place.
     """
     for agent in chosen:
         if (regret[agent] <= least) != is_free:
@@ -152,17 +152,17 @@ def change_tasks(
     factor: Floats,
     entry: Indices,
 ) -> None:
-    """Let each agent change to the task where its utility is most, one after the other.
+    """Let each agent in turn change to the task of highest utility.
 
-    The utility of a unit of ability is the price of the task, times e for each `width` that the work falls short; an
-    agent counts with the mean of what that is without it and with it, about.
+    The utility of a unit of ability is the price of the task times exp(relative shortfall / `width`); for an agent, it
+    is approximately the mean of the values without and with that agent.
 
     Parameters
     ----------
     chosen, need, done, entry
-        As in `assign`.
+        See `assign`.
     factor : ndarray, shape (m,)
-        Utility of a unit more on each task as it is; changed in place.
+        Utility of a further unit of ability on each task; changed in place.
     """
     for agent in chosen:
         now, best = entry[agent], 0.0
@@ -176,7 +176,7 @@ def change_tasks(
             if task < 0:
                 break
             brought = ability[agent] * (1.0 - lists.lost[agent, k] * scale)
-            if k == now or brought * factor[task] <= best:  # its utility is less than that of its first part
+            if k == now or brought * factor[task] <= best:  # an upper bound on its utility
                 continue
             gain = brought * _utility(task, done[task] + 0.5 * brought, price, need, width)
             if gain > best:
@@ -193,5 +193,5 @@ def change_tasks(
 
 @compiled
 def _utility(task: int, done: float, price: Floats, need: Floats, width: float) -> float:
-    """Return the utility of a unit of ability more where that much is there."""
+    """Return the utility of a further unit of ability on a task that has `done`."""
     return float(price[task] * np.exp(min(LARGEST_EXPONENT, (1.0 - done / need[task]) / width)))

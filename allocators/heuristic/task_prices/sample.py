@@ -1,4 +1,4 @@
-"""A sample of agents that stands for all, everywhere in about the same way."""
+"""A spatially representative sample of agents."""
 
 import numpy as np
 
@@ -6,14 +6,14 @@ from alloc.problems import Instance
 from alloc.problems.instance import FloatArray, IntArray
 
 BITS = 16
-"""Bits of each coordinate in a place along the curve."""
+"""Bits per coordinate of a code on the curve."""
 
 
 def representatives(instance: Instance, count: int) -> tuple[IntArray, FloatArray]:
-    """Return agents, and the ability of all that each stands for, itself included.
+    """Return a sample of agents, and the total ability of the agents that each represents, including itself.
 
-    Agents are cut into `count` blocks along a curve that keeps near places together; one agent of each block, drawn at
-    random, has the ability of all of it. Hence any region has about as much ability in the sample as it has in all.
+    Agents are divided into `count` blocks along a space-filling curve; one agent of each block, drawn at random,
+    represents the ability of the whole block. Hence any region has about the same ability in the sample as in total.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ def representatives(instance: Instance, count: int) -> tuple[IntArray, FloatArra
 
 
 def _along_curve(instance: Instance) -> IntArray:
-    """Return the place of each agent along a Z-order curve, shape (n,); 0 where its position is unknown."""
+    """Return the code of each agent on a Z-order curve, shape (n,); 0 if its position is unknown."""
     place = instance.reach.place
     known = ~np.isnan(place).any(axis=1)
     code = np.zeros(len(place), dtype=np.int64)

@@ -1,6 +1,6 @@
-"""The most valuable tasks of each agent at given prices, found in a tree over the tasks; compiled.
+"""Compiled searches for the most valuable tasks of each agent at given prices, in a tree over the tasks.
 
-The value of an agent on a task is the price of the task times the part of the makespan that is left on arrival.
+The value of an agent on a task is the price of the task times the share of the makespan that is left on arrival.
 """
 
 from typing import NamedTuple
@@ -14,14 +14,14 @@ from alloc.allocators.runtime.compiled import compiled, inlined
 
 
 class Shortlists(NamedTuple):
-    """The tasks of most value for each agent, the best first.
+    """The most valuable tasks of each agent, best first.
 
     Attributes
     ----------
     task : ndarray of int32, shape (agents, length)
-        -1 behind the last.
+        Tasks, followed by -1 if there are fewer.
     lost : ndarray of float32, shape (agents, length)
-        Part of the makespan that passes before arrival.
+        Share of the makespan that passes before arrival.
     """
 
     task: NDArray[np.int32]
@@ -29,7 +29,7 @@ class Shortlists(NamedTuple):
 
 
 def empty_shortlists(agents: int, length: int) -> Shortlists:
-    """Return shortlists that are to be filled."""
+    """Return empty shortlists."""
     return Shortlists(np.full((agents, length), -1, dtype=np.int32), np.zeros((agents, length), dtype=np.float32))
 
 
@@ -49,15 +49,15 @@ def fill_highest(tree: Tree, price: Floats, highest: Floats) -> None:
 def find_shortlists(
     first: int, last: int, agents: Agents, tree: Tree, goal: Floats, price: Floats, highest: Floats, found: Shortlists
 ) -> float:
-    """Fill the shortlists of agents `first` to `last`; return the total value of all, each on its best task.
+    """Fill the shortlists of agents `first` to `last`; return their total value, each on its best task.
 
     Parameters
     ----------
     first, last : int
     agents, tree
-        As in the greedy method; `Agents.horizon` belongs to the makespan.
+        As in the greedy method, with `Agents.horizon` for the makespan.
     goal : ndarray, shape (m, 3)
-        Where the tasks are.
+        Positions of the tasks.
     price : ndarray, shape (m,)
         0 for tasks outside the tree.
     highest : ndarray, shape (nodes,)
@@ -79,7 +79,7 @@ def find_shortlists(
 
 @inlined
 def _offer(agent: int, task: int, gain: float, lost: float, value: Floats, found: Shortlists) -> None:
-    """Insert a task where the agent has more value than on the last one of the shortlist."""
+    """Insert a task into the shortlist of an agent, in place of the last one."""
     at = len(value) - 1
     while at > 0 and value[at - 1] < gain:
         value[at] = value[at - 1]
@@ -138,7 +138,7 @@ def _search_tree(
                 position, tree.low[right], tree.high[right]
             ):
                 left, right = right, left
-            stack[size], stack[size + 1] = left, right  # the nearer one is visited first
+            stack[size], stack[size + 1] = left, right  # the nearer child is visited first
             size += 2
             continue
         for entry in range(tree.begin[node], tree.end[node]):
@@ -152,7 +152,7 @@ def _search_tree(
 
 @compiled
 def _distance_to_box(position: Floats, low: Floats, high: Floats) -> float:
-    """Return no more than the distance to any task in the box; 0 where the position is unknown."""
+    """Return a lower bound on the distance to any task in the box; 0 if the position is unknown."""
     total = 0.0
     for axis in range(3):
         step = max(0.0, low[axis] - position[axis], position[axis] - high[axis])
@@ -172,16 +172,16 @@ def smooth_value(
     width: float,
     share: Floats,
 ) -> tuple[float, float]:
-    """Return the total value of agents `first` to `last`, smoothed and as it is; add that of each task to `share`.
+    """Return the total value of agents `first` to `last`, smoothed and exact; add the value by task to `share`.
 
-    The smoothed value of an agent is the norm of its values to the power of 1 / `width`.
+    The smoothed value of an agent is the p-norm of its values on tasks, with p = 1 / `width`.
 
     Parameters
     ----------
     scale : float
-        Factor on `Shortlists.lost`, for another makespan than that of the shortlists.
+        Factor on `Shortlists.lost`, for a makespan different from that of the shortlists.
     width : float
-        Relative difference of values that counts as small.
+        Width of the smoothing: relative difference of values that counts as small.
     """
     length = lists.task.shape[1]
     value = np.empty(length)

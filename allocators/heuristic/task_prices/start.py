@@ -1,4 +1,4 @@
-"""Where local search begins on large instances: a bound by prices of tasks, and a plan that follows them."""
+"""The start of local search on large instances: a bound from prices of tasks, and a plan according to them."""
 
 import time
 from typing import NamedTuple
@@ -12,32 +12,32 @@ from alloc.problems import Allocation, Instance, serve_all
 from alloc.problems.instance import FloatArray
 
 TIME_SHARE = 0.5
-"""Part of the time left for the prices."""
+"""Share of the remaining time for the prices."""
 
 CLOSE = 0.003
-"""Gap up to which the plan at hand is better to begin with: what follows prices is hardly nearer to the bound."""
+"""Gap up to which the current plan is the better start, as plans from prices are hardly closer to the bound."""
 
 MOST_THREADS = 32
-"""Threads beyond which more are not used."""
+"""Maximum number of threads that are used."""
 
 
 class PricedPlan(NamedTuple):
-    """A plan, and the price of a unit of ability on each task that it follows, shape (m,)."""
+    """A plan according to prices, and the prices of a unit of ability on each task, shape (m,)."""
 
     allocation: Allocation
     price: FloatArray
 
 
 def plan_by_prices(search: Search) -> PricedPlan | None:
-    """Raise the bound by prices of tasks, submit a plan that follows them, and return it.
+    """Raise the bound by prices of tasks, submit a plan according to them, and return it.
 
-    In such a plan some tasks lack a little, and agents change between tasks at hardly any loss: exchanges soon bring
-    it near the bound.
+    In such a plan, shortfalls are small, and agents can change tasks at little loss, so that exchanges soon bring it
+    close to the bound.
 
     Returns
     -------
     PricedPlan or None
-        None where there are few agents, or prices prove nothing.
+        None if there are few agents, or the prices do not raise the bound.
     """
     instance = search.instance
     if not are_prices_used(instance) or search.lower_bound <= 0 or search.fast_enough or search.should_stop():
@@ -56,8 +56,8 @@ def plan_by_prices(search: Search) -> PricedPlan | None:
 
 
 def compile_loops() -> None:
-    """Compile the loops, or read them from the cache."""
+    """Compile the loops, or load them from the cache."""
     one = Instance(ability=[1.0], workload=[1.0], agent_position=[[0, 0]], task_position=[[1, 0]], speed=[1.0])
     prices = TaskPrices(one, 1.0, map, 1)
-    prices.look_at_all().value(prices.price, 1.0, 0.1)
+    prices.evaluate_all().value(prices.price, 1.0, 0.1)
     rounded(prices)

@@ -1,11 +1,11 @@
-"""Which instances have prices of tasks in local search; does not import numba."""
+"""Decides whether local search uses prices of tasks; does not import numba."""
 
 from alloc.problems import Instance
 
 LEAST_AGENTS = 5_000
-"""Agents below which linear programmes and exchanges alone do as well."""
+"""Number of agents below which linear programmes and exchanges alone do as well."""
 
 
 def are_prices_used(instance: Instance) -> bool:
-    """Return whether there are many agents, for whom tasks differ by more than their workloads."""
+    """Return whether there are many agents, and tasks differ in reach or travel times."""
     return instance.n >= LEAST_AGENTS and (instance.has_travel_time or not instance.reach.is_complete)
