@@ -22,26 +22,26 @@ from alloc.problems import Allocation, InputError, Instance, Objective
 from alloc.problems.arguments import text
 
 GPU_PAIRS, GPU_GAMES = 40_000, 512
-"""`pairs_per_stream` and `games_per_region` of the planner on a GPU, where ten times as many games take no longer."""
+"""`pairs_per_stream` and `games_per_region` of the planner on a GPU, where ten times as many games take as long."""
 
 START_ENERGY_WEIGHT = 2.0
-"""Weight of energy in the game that local search starts from, where travel takes no time."""
+"""Weight of energy in the game from which local search starts, without travel times."""
 
 
 class PolicyAllocator(Allocator):
-    """A learned policy, as shipped or from a file that `alloc train` wrote; subclasses say which.
+    """Base class of learned policies, as shipped or from a file by `alloc train`; subclasses define the method.
 
     Parameters
     ----------
     policy : Path or str, optional
-        Policy file; the one that ships with the package by default.
+        Policy file; by default the one that is part of the package.
     device : str
-        Where the networks run, such as ``cpu`` or ``cuda``.
+        Device on which the networks run, such as ``cpu`` or ``cuda``.
 
     Raises
     ------
     InputError
-        If the file is no policy, does not fit this version, or there is no such device.
+        If the file is not a policy file or does not fit this version, or there is no such device.
     """
 
     trained_by: str
@@ -64,19 +64,19 @@ class PolicyAllocator(Allocator):
             return load_policy(shipped, self.trained_by, self.device)
 
     def changed_parameters(self) -> dict[str, object]:
-        """Return the policy file and the device, where they are not the default ones."""
+        """Return the policy file and the device if they differ from the defaults."""
         given = {"policy": self.policy, "device": str(self.device)}
         return {name: value for name, value in given.items() if value not in (None, "cpu")}
 
     def refusal(self, instance: Instance, objective: Objective, budget: Budget) -> str | None:
-        """Refuse where not even one game would end in time."""
+        """Refuse instances on which not even one game would end in time."""
         return too_large(instance, budget)
 
     def allocate(self, search: Search) -> Proposal:
         """Play games and submit improvements until the budget ends."""
         if not (search.instance.workload > 0).any():
             return Proposal(Allocation.idle(search.instance))
-        with plain_torch(), torch_threads(1):  # the tensors are small: a second thread costs more than it brings
+        with plain_torch(), torch_threads(1):  # for small tensors, a second thread costs more than it saves
             self.plan(search)
         return Proposal()
 
@@ -111,7 +111,7 @@ class Ddpg(PolicyAllocator):
 
 
 class Gappo(PolicyAllocator):
-    """A population of actor-critics; where time allows, it is fine-tuned on the instance itself.
+    """A population of actor-critics, which is fine-tuned on the instance itself if time permits.
 
     References
     ----------
@@ -127,7 +127,7 @@ class Gappo(PolicyAllocator):
 
 
 class GappoLs(Gappo):
-    """A first plan by the policies, improved by local search: a hybrid."""
+    """A hybrid: the first plan of the policies, improved by local search."""
 
     method = BUILT_IN["gappo-ls"]
 
@@ -138,7 +138,7 @@ class GappoLs(Gappo):
         compile_loops()
 
     def plan(self, search: Search) -> None:
-        """Play one game on the whole instance, then improve its plan by local search."""
+        """Play one game on the whole instance, and improve its plan by local search."""
         from alloc.allocators.heuristic.local_search.improve import improve
 
         energy_weight = self.parameters.first_energy_weight if search.instance.has_travel_time else START_ENERGY_WEIGHT
@@ -148,18 +148,18 @@ class GappoLs(Gappo):
 
 
 def usable(device: str) -> torch.device:
-    """Return the device of that name.
+    """Return the torch device with this name.
 
     Raises
     ------
     InputError
-        If it cannot be used here.
+        If it cannot be used on this machine.
     """
     try:
         torch.zeros(1, device=text(device, "device")).item()
         return torch.device(device)
     except torch.OutOfMemoryError as error:
         raise InputError(f"{device!r} has no memory left", "device") from error
-    except (RuntimeError, AssertionError, ImportError) as error:  # the message of torch would not help a user
+    except (RuntimeError, AssertionError, ImportError) as error:  # torch's message would not help users
         able = "cpu or cuda" if torch.cuda.is_available() else "cpu"
         raise InputError(f"{device!r} cannot be used here; use {able}", "device") from error

@@ -1,8 +1,8 @@
-"""Advantage actor-critic (A2C): a few steps of every game, one gradient step on them, and so on.
+"""Advantage actor-critic (A2C): alternates a few steps of every game with one gradient step on them.
 
-The advantage (16) is Q(s, a) - V(s), where Q is estimated by the n-step return: the rewards of the n steps that were
-played, or of those left until the update, and the value of the state after them. The paper leaves the estimate of Q
-open. All agents that move in a step share its advantage.
+The advantage (16) is Q(s, a) - V(s), where Q is estimated by the n-step return: the rewards of n steps, or of those
+until the next update, plus the value of the state after them. The paper does not specify the estimate of Q. All agents
+that move in a step share its advantage.
 
 References
 ----------
@@ -30,9 +30,9 @@ def n_step_returns(reward: Tensor, alive: Tensor, last_value: Tensor, gamma: flo
     ----------
     reward : Tensor, shape (S, B)
     alive : Tensor of bool, shape (S, B)
-        Whether each game had not ended before each step.
+        Whether each game was still running before each step.
     last_value : Tensor, shape (B,)
-        Value after the last step, 0 where the game has ended.
+        Value after the last step, 0 if the game has ended.
     gamma : float
         Discount per step.
     """

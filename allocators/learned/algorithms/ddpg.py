@@ -1,11 +1,11 @@
 """Deep deterministic policy gradient (DDPG), relaxed to discrete actions.
 
 DDPG differentiates the critic with respect to a continuous action. A bid is a discrete action, so the action is relaxed
-to the softmax over the open bids and stopping: a point of the simplex whose corners are the actions themselves. The
+to the softmax over the open bids and stopping: a point of the simplex whose vertices are the actions themselves. The
 critic values such a point by its multilinear extension, Q(s, x) = sum over b of x_b * q(s, b), which agrees with q at
-the corners; stopping ends the game, so that its q is 0 and bids are valued relative to it. With that,
+the vertices; stopping ends the game, so that its q is 0 and bids are valued relative to it. Hence
 d Q / d x_b = q(s, b), and (18) becomes the gradient of the mean of q over the actor's actions: a policy gradient over
-all bids at once, without the variance of sampled ones. Since Q is linear in x, its maximum lies at a corner: an entropy
+all bids at once, without the variance of sampled ones. Since Q is linear in x, its maximum lies at a vertex: an entropy
 bonus keeps the actor from converging there too early.
 
 Bids are executed in the order of the actor's scores, with Gumbel noise added in training, which samples them from the
@@ -60,7 +60,7 @@ class Ddpg:
     Parameters
     ----------
     size : NetworkSize, optional
-        Of actor and critic each.
+        Size of both actor and critic.
     parameters : DdpgParameters, optional
     seed : int
         Seed of the initial weights.
@@ -126,7 +126,7 @@ class Ddpg:
 
     @torch.no_grad()
     def td_targets(self, board: Board, following: State, reward: Tensor, rules: Rules) -> Tensor:
-        """Return the targets of the critic, shape (B,), from the states that follow and the rewards, shape (B,)."""
+        """Return the targets of the critic, shape (B,), from the next states and the rewards, shape (B,)."""
         relaxed = self._act(self.targets["actor"], board, following, rules)
         q_value = self._gains(self.targets["critic"], board, following, rules)
         return td_target(reward, relaxed_value(relaxed, q_value), following.done, self.parameters.gamma)

@@ -1,11 +1,11 @@
 """Deep Q-learning (DQN): the scores of the bids are their values, learned from a replay memory of single moves.
 
 The value of a bid is its score above the reserve: Q(s, bid) = score - reserve. Stopping ends the game and has value 0,
-which need not be learned: the terminal mask of (17) is built in. A game that was cut off at the maximum number of steps
-has not ended, and its last move is followed by the value of the next state like any other.
+which need not be learned: the terminal mask of (17) is built in. A game truncated at the maximum number of steps has
+not ended, and the target of its last move includes the value of the next state, like any other.
 
-The paper's (17) has neither a target network nor a terminal mask; both are needed: the first for stable targets, the
-second because nothing follows the end of a game.
+The paper's (17) has neither a target network nor a terminal mask; both are needed: the former for stable targets, the
+latter because the end of a game has no successor.
 
 References
 ----------
@@ -28,7 +28,7 @@ from alloc.problems.game import Board, Rules, State
 
 
 def td_target(reward: Tensor, next_value: Tensor, done: Tensor, gamma: float) -> Tensor:
-    """Return the target r + gamma * V(s') of (17), only r where the game is `done`; all of shape (B,)."""
+    """Return the target r + gamma * V(s') of (17), or r if the game is `done`; all of shape (B,)."""
     return reward + gamma * next_value.masked_fill(done, 0.0)
 
 
@@ -91,7 +91,7 @@ class Dqn:
         return TrainingStats(decisions, evaluations, float(np.mean(rewards)), 0.0, 0.0, rate)
 
     def update(self, rules: Rules, generator: torch.Generator) -> None:
-        """Take one gradient step on replayed moves, and update the target network where its interval is over."""
+        """Take one gradient step on replayed moves, and update the target network at its interval."""
         board, state, action, reward = self.memory.draw(self.parameters.batch_size, generator)
         scores = self.network(board, state)
         value = scores_above_reserve(scores.bids, scores.reserve, board, state, rules).gather(1, action[:, None])[:, 0]
@@ -106,7 +106,7 @@ class Dqn:
 
     @torch.no_grad()
     def td_targets(self, board: Board, following: State, reward: Tensor, rules: Rules) -> Tensor:
-        """Return the targets of (17), shape (B,), from the states that follow and the rewards, shape (B,)."""
+        """Return the targets of (17), shape (B,), from the next states and the rewards, shape (B,)."""
         scores = self.target(board, following)
         value = selector = scores_above_reserve(scores.bids, scores.reserve, board, following, rules)
         if self.parameters.double_q:

@@ -29,7 +29,7 @@ class _Fitness(base.Fitness):  # type: ignore[misc]
 
 
 class _Genome(list[float]):
-    """All weights of a network in one list, as DEAP's operators expect them, and the index of its member."""
+    """All weights of a network in one list, as DEAP's operators expect, and the index of its member."""
 
     def __init__(self, weights: Sequence[float], member: int, fitness: float) -> None:
         super().__init__(weights)
@@ -49,7 +49,7 @@ def fitness(
     entropies : sequence of float
         Mean entropy of each policy in nats.
     evaluations : sequence of float
-        Network evaluations of each member, the cost E_i, which counts against it.
+        Network evaluations of each member, which are the cost E_i.
     """
     terms = (
         (parameters.return_weight, returns),
@@ -74,7 +74,7 @@ def breed(
         States of learners by PPO, as `Learner.state_dict` returns them; breeding changes the weights, ``network``, and
         the learning rate in ``optimiser``.
     scores : sequence of float
-        Fitness of each.
+        Fitness of each member.
     parameters : BreedingParameters
     seed : int
     """
@@ -91,11 +91,11 @@ class Offspring(NamedTuple):
     Attributes
     ----------
     parent : int
-        Its first parent.
+        Index of its first parent.
     genome : list of float or None
-        None where it is the parent, unchanged.
+        Its weights; None if it is the unchanged parent.
     rate_factor : float
-        By which its learning rate differs from the parent's.
+        Factor on the parent's learning rate.
     """
 
     parent: int
@@ -106,7 +106,7 @@ class Offspring(NamedTuple):
 def offspring(
     genomes: Sequence[list[float]], scores: Sequence[float], parameters: BreedingParameters, rng: random.Random
 ) -> list[Offspring]:
-    """Return the next generation of as many genomes, the best first: the elite, and children of tournament winners."""
+    """Return the next generation of the same size, best first: the elite, and children of tournament winners."""
     known = [_Genome(*one) for one in zip(genomes, range(len(genomes)), scores, strict=True)]
     unchanged = min(parameters.elite, max(1, len(known) - 1))  # at least one of several members is a child
     following = [Offspring(genome.member) for genome in tools.selBest(known, unchanged)]
@@ -136,7 +136,7 @@ def _toolbox(parameters: BreedingParameters, rng: random.Random) -> base.Toolbox
 def _with_generator(rng: random.Random, operator: FunctionType) -> Callable[..., object]:
     """Return an operator of DEAP bound to a copy of its module in which `random` is `rng`.
 
-    DEAP draws from the global generator, which all threads and the embedding program share.
+    DEAP draws from the global generator, which is shared by all threads and the embedding program.
     """
     module: dict[str, object] = {**operator.__globals__, "random": rng}
     for name, value in operator.__globals__.items():

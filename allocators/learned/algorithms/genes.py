@@ -1,9 +1,9 @@
-"""GAPPO with one network for its whole population, whose members differ by their biases alone.
+"""GAPPO with one network for its whole population, whose members differ only in their biases.
 
-Trained from nothing, members with networks of their own share out the games to learn from. Here all train the same
-weights, and every member adds its gene to the biases: a point of reference for exploration, selected, crossed and
-mutated as Algorithm 1 has it. The replay buffer is one for all, and what is learned from it is corrected for the
-policy of the member that played.
+When trained from scratch, members with separate networks have to divide the games among them. Here all members train
+the same weights, and each adds its gene, a vector, to the biases: a reference point for exploration, subject to
+selection, crossover and mutation as in Algorithm 1. All members share a replay buffer, and learning from it is
+corrected for the policy of the member that played.
 
 References
 ----------
@@ -27,22 +27,22 @@ from alloc.problems.game import Board, Rules
 
 
 class Genes:
-    """What each of several members adds to the biases of the network that they share.
+    """The vectors that the members add to the biases of their shared network.
 
     Parameters
     ----------
     network : ActorCritic
-        Expresses the first member's gene, which adds nothing, at the beginning.
+        The shared network; it initially expresses the first member's gene, which is 0.
     count : int
     sigma : float
-        Standard deviation of the numbers in the other genes.
+        Standard deviation of the entries of the other genes.
     seed : int
 
     Attributes
     ----------
     vectors : Tensor, shape (count, number of biases)
     expressed : int
-        The member that the network is at the moment.
+        The member whose gene is currently added to the network.
     """
 
     def __init__(self, network: ActorCritic, count: int, sigma: float, seed: int) -> None:
@@ -54,7 +54,7 @@ class Genes:
 
     @torch.no_grad()
     def express(self, member: int) -> None:
-        """Make the network that of a member."""
+        """Add the gene of a member to the network, in place of that of the current member."""
         self._add(self.vectors[member] - self.vectors[self.expressed])
         self.expressed = member
 
@@ -73,14 +73,14 @@ class Genes:
 class GeneticPpo(Ppo):
     """A learner by PPO of `GappoParameters.genes` members that share a network; see `Learner`.
 
-    They take turns, an update each. Their fitness (12) is that of the games that they learn from, so that no games are
-    spent on comparing alone. The policy is that of the fittest.
+    They take turns, with one update each. Their fitness (12) is measured in the games that they learn from, so that no
+    games are needed for comparisons only. The policy is that of the fittest member.
 
     Parameters
     ----------
     size : NetworkSize, optional
     parameters : GappoParameters or PpoParameters, optional
-        Those of PPO are for a single member.
+        Those of PPO describe a single member.
     seed : int
         Seed of the initial weights and genes.
     """
@@ -93,7 +93,7 @@ class GeneticPpo(Ppo):
         self.since: list[Update] = []
 
     def policies(self) -> list[ActorCritic]:
-        """Return a copy of each member's network, the fittest first."""
+        """Return a copy of each member's network, fittest first."""
         copies = []
         for member in range(self.population.genes):
             self.genes.express(member)
@@ -106,7 +106,7 @@ class GeneticPpo(Ppo):
     def learn(
         self, board: Board, steps: int, rules: Rules, generator: torch.Generator, max_rate: float
     ) -> list[Update]:
-        """Let the member whose turn it is play and learn, and breed where a generation ends; see `Ppo.learn`."""
+        """Let the member whose turn it is play and learn, and breed at the end of a generation; see `Ppo.learn`."""
         updates = self._turn(len(self.since) % self.population.genes, board, steps, rules, generator, max_rate)
         self.since += updates
         if len(self.since) >= max(self.population.breeding_interval, self.population.genes):
@@ -125,7 +125,7 @@ class GeneticPpo(Ppo):
         return updates
 
     def _breed(self, seed: int) -> None:
-        """Replace the genes by those of the next generation, the fittest first."""
+        """Replace the genes by those of the next generation, fittest first."""
         parameters = replace(BreedingParameters(), mutation_sigma=self.population.gene_sigma, mutated_fraction=1.0)
         old = self.genes.vectors
         born = offspring(old.tolist(), self._fitness(parameters), parameters, random.Random(seed))

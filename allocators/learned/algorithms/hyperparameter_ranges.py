@@ -37,7 +37,7 @@ class Range:
             return self.optional
         if isinstance(value, bool) or not isinstance(value, Integral if self.whole else Real):
             return False
-        number = cast("float", value)  # numbers of numpy compare as well
+        number = cast("float", value)  # numpy's numbers can be compared as well
         return bool((self.low < number if self.above else self.low <= number) and number <= self.high)
 
     def __str__(self) -> str:
@@ -73,11 +73,11 @@ RANGES: Mapping[str, Range] = {
     **dict.fromkeys(("buffer_size", "elite", "breeding_interval"), Range(0, MAX_VALUE, whole=True)),
     "target_kl": Range(1 / MAX_VALUE, MAX_VALUE, optional=True),
 }
-"""Range of each by name, whatever the method."""
+"""Range of each hyperparameter by name, for all methods."""
 
 
 def check_ranges(parameters: "DataclassInstance", **others: Range) -> None:
-    """Raise an `InputError` for the first field out of its range, that in `others` or else in `RANGES`."""
+    """Raise an `InputError` for the first field that is out of its range in `others`, or else in `RANGES`."""
     for field in fields(parameters):
         allowed, value = others.get(field.name) or RANGES.get(field.name), getattr(parameters, field.name)
         if allowed is not None and value not in allowed:

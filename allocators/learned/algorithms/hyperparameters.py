@@ -1,6 +1,6 @@
 """Hyperparameters of the learning methods, checked when they are set; does not import torch.
 
-Names follow CleanRL and Stable-Baselines3. The paper gives no values but the capacity C: the defaults are ours.
+Names follow CleanRL and Stable-Baselines3. Of their values, the paper gives only the capacity C; the defaults are ours.
 """
 
 from dataclasses import dataclass
@@ -18,11 +18,11 @@ class PpoParameters:
         Initial learning rate of Adam.
     final_lr_fraction : float
         Upper bound of the learning rate at the end of the training, as a fraction of `max_learning_rate`; the bound
-        falls linearly with progress.
+        decreases linearly with progress.
     max_learning_rate : float
         Upper bound of the learning rate at the beginning.
     target_kl : float or None
-        Divergence per update, in nats, at which the learning rate is kept; None for one that only follows its bound.
+        Target divergence per update, in nats, for adapting the learning rate; if None, the rate only follows its bound.
     gamma : float
         Discount per step, gamma of (9).
     gae_lambda : float
@@ -67,17 +67,16 @@ class PpoParameters:
 
 @dataclass(frozen=True)
 class GappoParameters(PpoParameters):
-    """PPO as GAPPO's members run it: with an adaptive learning rate and a replay buffer, and many of them in a network.
+    """Hyperparameters of GAPPO's members: PPO with an adaptive learning rate, a replay buffer and optional genes.
 
     Attributes
     ----------
     genes : int
-        Members that share all weights of one network but the biases, by which they differ (`genes.Genes`); 1 for a
-        network of its own.
+        Number of members that share one network except for its biases (`genes.Genes`); 1 for a separate network.
     gene_sigma : float
-        Standard deviation of the first differences between their biases, and of mutations.
+        Standard deviation of the initial differences between their biases, and of mutations.
     breeding_interval : int
-        Updates between two generations of genes; 0 for genes that stay as they are drawn.
+        Number of updates between two generations of genes; 0 for genes that are not bred.
     """
 
     target_kl: float | None = 0.012
@@ -91,8 +90,8 @@ class GappoParameters(PpoParameters):
 class A2cParameters:
     """Hyperparameters of A2C.
 
-    Rounded from one of five short trials with one seed each, too few to tell them apart; in twelve longer ones
-    (`allocators/experiments/reproduction/protocol.py`) none was better.
+    Rounded from one of five short trials with one seed each, which are too few to distinguish them; in twelve longer
+    trials (`allocators/experiments/reproduction/protocol.py`) none was better.
 
     Attributes
     ----------
@@ -129,8 +128,8 @@ class A2cParameters:
 class DqnParameters:
     """Hyperparameters of DQN.
 
-    Rounded from the best of four short trials with one seed each, too few to tell them apart; others that were slightly
-    better in small games: `allocators/experiments/reproduction/protocol.py:TUNED`.
+    Rounded from the best of four short trials with one seed each, which are too few to distinguish them; for others
+    that were slightly better in small games, see `allocators/experiments/reproduction/protocol.py:TUNED`.
 
     Attributes
     ----------
@@ -143,7 +142,7 @@ class DqnParameters:
     reward_scale : float
         Factor on rewards, which are fractions of 1.
     temperature, final_temperature : float
-        Of the softmax over Q from which bids are sampled, at the beginning and at the end; it falls exponentially.
+        Initial and final temperature of the softmax over Q from which bids are sampled; it decreases exponentially.
     exploration_initial_eps : float
         Initial probability that a step begins with a random bid; it falls linearly to 0.
     buffer_size : int
@@ -182,8 +181,8 @@ class DqnParameters:
 class DdpgParameters:
     """Hyperparameters of DDPG.
 
-    Rounded from the third of four short trials with one seed each, as the two ahead of it evaluate twice as many states
-    per decision; others that were slightly better in small games:
+    Rounded from the third best of four short trials with one seed each, as the two better ones evaluate twice as many
+    states per decision; for others that were slightly better in small games, see
     `allocators/experiments/reproduction/protocol.py:TUNED`.
 
     Attributes
@@ -201,8 +200,7 @@ class DdpgParameters:
     softmax_temperature : float
         Temperature of the softmax that relaxes the action, and of sampling.
     ent_coef, final_ent_coef : float
-        Coefficient of the entropy bonus at the beginning and at the end; it falls exponentially, and stays 0 where it
-        begins at 0.
+        Initial and final coefficient of the entropy bonus; it decreases exponentially, or stays at 0 if it begins at 0.
     exploration_initial_eps : float
         Initial probability that a step begins with a random bid; it falls linearly to 0.
     buffer_size : int
@@ -212,8 +210,8 @@ class DdpgParameters:
     replay_ratio : float
         Number of times that each move is replayed, on average.
     tau : float
-        Polyak factor of the target networks, 0 to 1: the fraction by which they approach the online networks with
-        each gradient step.
+        Polyak factor of the target networks, 0 to 1: the fraction by which they approach the online networks in each
+        gradient step.
     max_grad_norm : float
         Norm to which gradients are clipped.
     """
@@ -244,7 +242,7 @@ class BreedingParameters:
     Attributes
     ----------
     elite : int
-        Members that are kept unchanged; at most all but one.
+        Number of members that are kept unchanged; at most all except one.
     tournament_size : int
         Members drawn for each tournament selection of a parent.
     crossover_probability : float
@@ -252,7 +250,7 @@ class BreedingParameters:
     mutation_probability : float
         Probability that a child is mutated.
     mutated_fraction : float
-        Probability of each weight to change in a mutation.
+        Probability that a weight changes in a mutation.
     mutation_sigma : float
         Standard deviation of the change of a weight.
     return_weight, entropy_weight, cost_weight : float
@@ -274,4 +272,4 @@ class BreedingParameters:
 
 
 Hyperparameters = PpoParameters | A2cParameters | DqnParameters | DdpgParameters
-"""Those of any method."""
+"""Hyperparameters of any method."""

@@ -1,4 +1,4 @@
-"""The protocol of learners: what trains one policy, and can be stored and restored anywhere."""
+"""The protocol of learners, which train one policy, and can be stored and restored anywhere."""
 
 from dataclasses import dataclass
 from typing import Protocol
@@ -11,7 +11,7 @@ from alloc.problems.game import PLANNING, Board, Rules
 
 
 class GameSource(Protocol):
-    """Where the games of updates come from, such as a `Curriculum`."""
+    """A source of games for updates, such as a `Curriculum`."""
 
     def draw(self, rng: np.random.Generator, progress: float) -> Board:
         """Draw the games of an update; `progress` is the share of the training that is done, 0 to 1."""
@@ -22,7 +22,7 @@ class GameSource(Protocol):
 
 @dataclass(frozen=True)
 class TrainingJob:
-    """A stretch of training for one learner; its result depends on the learner's state and the job alone.
+    """A section of the training of one learner; its result depends only on the learner's state and the job.
 
     Attributes
     ----------
@@ -33,7 +33,7 @@ class TrainingJob:
     curriculum : GameSource
         The games that are played.
     progress : float
-        Share of the whole training that is done before this job, 0 to 1: the schedules follow it.
+        Share of the whole training that is done before this job, 0 to 1, on which schedules depend.
     rules : Rules
     """
 
@@ -53,15 +53,15 @@ class TrainingStats:
     decisions : int
         Decisions of agents that were played.
     evaluations : int
-        States that networks evaluated, in playing and in learning: the cost E_i of (12).
+        States that networks evaluated while playing and learning: the cost E_i of (12).
     reward : float
         Mean undiscounted return of a game.
     entropy : float
-        Mean entropy of the policy in nats, 0 for policies that are not sampled from.
+        Mean entropy of the policy in nats, 0 for policies that are not sampled.
     approx_kl : float
-        Mean Kullback-Leibler divergence of an update in nats, 0 where it is not measured.
+        Mean Kullback-Leibler divergence of an update in nats, 0 if it is not measured.
     learning_rate : float
-        At the end of the job.
+        Learning rate at the end of the job.
     """
 
     decisions: int
@@ -77,13 +77,13 @@ class Learner(Protocol):
 
     @property
     def policy(self) -> ActorCritic:
-        """The network whose scores decide once trained: the highest bid above the reserve is the best."""
+        """The network that is trained; the best action is the highest bid above the reserve."""
 
     def train_on(self, job: TrainingJob) -> TrainingStats:
         """Play and learn until the job is done."""
 
     def state_dict(self) -> StateDict:
-        """Return the whole state of the learner; its tensors are those in use, not copies."""
+        """Return the complete state of the learner; its tensors are references, not copies."""
 
     def load_state_dict(self, state: StateDict) -> None:
         """Restore a state that `state_dict` returned."""

@@ -35,17 +35,17 @@ class Samples(NamedTuple):
     ----------
     board : Board
     game : Tensor of int, shape (N,)
-        Index on the board of the game that each state is of.
+        Index on the board of the game of each state.
     state : State
         Arrays begin with (N,).
     actions : Tensor of int, shape (N, k)
         At most k actions in a state, filled up with -1.
     log_probability : Tensor, shape (N, k)
-        By the policy that played.
+        Log-probability of each action under the policy that played.
     centre : Tensor, shape (N, k)
-        Probability ratio of each action at the start of the update, to the policy that played; 1 if on-policy.
+        Probability ratio of each action at the start of the update, relative to the policy that played; 1 on-policy.
     advantage, target : Tensor, shape (N,)
-        Normalised advantage, and the return that the critic learns.
+        Normalised advantage, and target return of the critic.
     """
 
     board: Board
@@ -64,7 +64,7 @@ class Update(NamedTuple):
     Attributes
     ----------
     decisions, evaluations : int
-        Decisions of agents that were played, and states that the network evaluated in playing and learning.
+        Decisions of agents that were played, and states that the network evaluated while playing and learning.
     reward : float
         Mean undiscounted return of a game.
     approx_kl, entropy : float
@@ -95,10 +95,10 @@ def value_loss(value: Tensor, target: Tensor) -> Tensor:
 
 
 def adapted_learning_rate(rate: float, approx_kl: float, target_kl: float | None, max_rate: float) -> float:
-    """Lower the learning rate where the divergence exceeds twice its target, and raise it below half the target.
+    """Lower the learning rate if the divergence exceeds twice its target, and raise it below half the target.
 
-    The paper's adaptive learning rate; its bounds `MIN_LEARNING_RATE` and `max_rate` are ours. Without a target the
-    rate is only bounded.
+    This is the paper's adaptive learning rate; the bounds `MIN_LEARNING_RATE` and `max_rate` are ours. Without a
+    target, the rate is only bounded.
     """
     factor = 1.0
     if target_kl is not None:
@@ -146,12 +146,12 @@ class Ppo:
     def learn(
         self, board: Board, steps: int, rules: Rules, generator: torch.Generator, max_rate: float
     ) -> "list[Update]":
-        """Play up to `steps` steps of each game on a board, and train on them; return the updates that were made."""
+        """Play up to `steps` steps of each game on a board, and train on them; return the updates."""
         played = collect(self.network, board, steps, generator, rules, self.parameters.reward_scale)
         return [self.learn_from(played, rules, generator, max_rate)]
 
     def learn_from(self, played: Trajectories, rules: Rules, generator: torch.Generator, max_rate: float) -> "Update":
-        """Train on new trajectories and on drawn ones of the replay buffer, to which the new ones then go."""
+        """Train on new trajectories and on draws from the replay buffer, to which the new ones are then added."""
         parameters = self.parameters
         old = [one for _ in range(parameters.replay_draws) if (one := self.replay.draw(generator)) is not None]
         approx_kl, entropy = self.update(played, old, rules, generator, max_rate)
@@ -178,7 +178,7 @@ class Ppo:
         Returns
         -------
         float, float
-            Mean divergence from the policy that played the new ones, and mean entropy, both in nats.
+            Mean divergence from the policy that played the new trajectories, and mean entropy, both in nats.
         """
         parameters = self.parameters
         set_learning_rate(self.optimiser, min(max_rate, self.learning_rate))
@@ -244,7 +244,7 @@ class Ppo:
 
 
 def on_policy_samples(played: Trajectories, parameters: PpoParameters) -> Samples:
-    """Return the samples of new trajectories, with advantages (9) and the returns that the critic learns."""
+    """Return the samples of new trajectories, with advantages (9) and target returns of the critic."""
     gain = advantages(
         played.reward, played.value, played.alive, played.last_value, parameters.gamma, parameters.gae_lambda
     )
@@ -255,8 +255,8 @@ def on_policy_samples(played: Trajectories, parameters: PpoParameters) -> Sample
 def off_policy_samples(network: ActorCritic, old: Trajectories, parameters: PpoParameters, rules: Rules) -> Samples:
     """Return the samples of trajectories that an earlier policy played, corrected for the current policy.
 
-    Values are those of the current critic, and traces are cut (as in V-trace) where the current policy is less likely
-    to take the actions than the earlier one, whose probabilities were stored.
+    Values are those of the current critic, and traces are cut, as in V-trace, where the current policy is less likely
+    to take the actions than the earlier policy, whose probabilities are stored.
     """
     value, log_probability = torch.zeros_like(old.value), torch.zeros_like(old.log_probability)
     when, game = torch.nonzero(old.alive, as_tuple=True)

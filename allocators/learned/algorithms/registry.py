@@ -1,4 +1,4 @@
-"""The learning methods by name; torch is not imported before a learner is made."""
+"""The learning methods by name; torch is not imported until a learner is created."""
 
 from collections.abc import Mapping
 from dataclasses import fields
@@ -28,7 +28,7 @@ METHODS: dict[str, tuple[str, str, type[Hyperparameters]]] = {
     "dqn": ("dqn", "Dqn", DqnParameters),
     "ddpg": ("ddpg", "Ddpg", DdpgParameters),
 }
-"""Module, learner and hyperparameters of each; `gappo` breeds a population of learners by `ppo`."""
+"""Module, learner and hyperparameters of each method; `gappo` breeds a population of `ppo` learners."""
 
 
 def _entry(method: str) -> tuple[str, str, type[Hyperparameters]]:
@@ -38,7 +38,7 @@ def _entry(method: str) -> tuple[str, str, type[Hyperparameters]]:
 
 
 def new_learner(method: str, size: "NetworkSize", parameters: Hyperparameters | None, seed: int) -> "Learner":
-    """Return an untrained learner, with the default hyperparameters where `parameters` is None.
+    """Return an untrained learner, with default hyperparameters if `parameters` is None.
 
     Raises
     ------
@@ -53,14 +53,14 @@ def new_learner(method: str, size: "NetworkSize", parameters: Hyperparameters | 
 
 
 def method_parameters(method: str, settings: Mapping[str, object] | None = None) -> Hyperparameters:
-    """Return the hyperparameters of a method, the defaults but for `settings`.
+    """Return the hyperparameters of a method: the defaults with changes by `settings`.
 
     Parameters
     ----------
     method : str
         One of `METHODS`.
     settings : mapping of str to object
-        Values by field; text is parsed, as on the command line.
+        Values by field; text is parsed as on the command line.
 
     Raises
     ------
@@ -83,12 +83,12 @@ def method_parameters(method: str, settings: Mapping[str, object] | None = None)
 
 
 def _text(value: object) -> str:
-    """Return a value as `_parse` reads it."""
+    """Return a value in the syntax that `_parse` reads."""
     return str(value).lower()
 
 
 def _parse(name: str, text: str, default: object) -> object:
-    """Return a text as a value of the default's type."""
+    """Convert text to a value of the default's type."""
     try:
         if isinstance(default, bool):
             return {"true": True, "false": False}[text.lower()]

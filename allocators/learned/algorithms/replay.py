@@ -1,4 +1,4 @@
-"""The replay buffer of PPO: trajectories of earlier policies, with the probabilities of their actions."""
+"""The replay buffer of PPO: trajectories of earlier policies, with the probabilities of the actions."""
 
 from dataclasses import fields
 
@@ -13,9 +13,9 @@ _NESTED = ("board", "state")
 
 
 class ReplayBuffer:
-    """The latest trajectories, up to `capacity` states in all; the oldest are dropped first.
+    """The latest trajectories, with up to `capacity` states in total; the oldest are dropped first.
 
-    Whole trajectories are kept, since advantages are estimated along them again at each use.
+    Whole trajectories are kept, as advantages are re-estimated along them at each use.
     """
 
     def __init__(self, capacity: int) -> None:
@@ -27,13 +27,13 @@ class ReplayBuffer:
         return sum(one.evaluations for one in self._kept)
 
     def add(self, played: Trajectories) -> None:
-        """Keep a trajectory, if it fits into the capacity at all."""
+        """Add a trajectory, if it does not exceed the capacity by itself."""
         self._kept.append(played)
         while self._kept and len(self) > self.capacity:
             self._kept.pop(0)
 
     def draw(self, generator: torch.Generator) -> Trajectories | None:
-        """Return one of the trajectories at random, None from an empty buffer."""
+        """Return a random trajectory, or None if the buffer is empty."""
         if not self._kept:
             return None
         return self._kept[int(torch.randint(len(self._kept), (1,), generator=generator))]

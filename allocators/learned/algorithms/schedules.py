@@ -4,12 +4,12 @@ import torch
 
 
 def linear(first: float, final_fraction: float, progress: float) -> float:
-    """Return the value on the line from `first` to `final_fraction` of it."""
+    """Return the linear interpolation between `first` and `final_fraction` of it."""
     return first * (1 - (1 - final_fraction) * progress)
 
 
 def exponential(first: float, last: float, progress: float) -> float:
-    """Return the value on the geometric path from `first` to `last`; 0 throughout where `first` is 0."""
+    """Return the geometric interpolation between `first` and `last`; always 0 if `first` is 0."""
     return first * (last / first) ** progress if first > 0 else first
 
 

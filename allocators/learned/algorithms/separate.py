@@ -1,6 +1,6 @@
-"""GAPPO whose members share nothing but the replay buffer: Algorithm 1 to the letter, each with a network of its own.
+"""GAPPO whose members share only the replay buffer: literally Algorithm 1, with a separate network for each member.
 
-For the ablation of sharing: `GeneticPpo` has the same first members, turns, buffer and generations.
+For an ablation of sharing: `GeneticPpo` has the same initial members, turns, buffer and generations.
 """
 
 import copy
@@ -19,8 +19,8 @@ from alloc.problems.game import Board, Rules
 class SeparateMembers(GeneticPpo):
     """A learner by PPO of `GappoParameters.genes` members, each with its own network and step size; see `GeneticPpo`.
 
-    They begin as the members of `GeneticPpo` do; from then on all of their weights are their own, and are bred as those
-    of a population in `train` are.
+    Initially they equal the members of `GeneticPpo`; from then on, all their weights are separate, and are bred like
+    those of a population in `train`.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ class SeparateMembers(GeneticPpo):
         return self.members[0].learning_rate
 
     def policies(self) -> list[ActorCritic]:
-        """Return each member's network, the fittest first."""
+        """Return each member's network, fittest first."""
         return [member.network for member in self.members]
 
     def _turn(
@@ -59,12 +59,12 @@ class SeparateMembers(GeneticPpo):
         return self.members[member].learn(board, steps, rules, generator, max_rate)
 
     def _breed(self, seed: int) -> None:
-        """Replace weights and step sizes by those of the next generation, the fittest first."""
+        """Replace weights and step sizes by those of the next generation, fittest first."""
         parameters = BreedingParameters()
         self._load(breed(self._members(), self._fitness(parameters), parameters, seed))
 
     def _members(self) -> list[StateDict]:
-        """Return weights and optimiser of each member, without the buffer that is common to all."""
+        """Return weights and optimiser of each member, without the shared buffer."""
         return [
             {"network": member.network.state_dict(), "optimiser": member.optimiser.state_dict()}
             for member in self.members

@@ -1,4 +1,4 @@
-"""Checkpoints: a whole training run in one file, with the description of the run; reading one never runs code."""
+"""Checkpoints: a complete training run in a file, with its description; reading one never executes code."""
 
 import io
 import zipfile
@@ -50,7 +50,7 @@ STORED_NAMES = {
     "learner.update_epochs": "learner.epochs",
     "learner.vf_coef": "learner.value_weight",
 }
-"""Names in descriptions of this format, of parameters that have other names in the program."""
+"""Names in descriptions of this format of parameters whose names in the program have changed."""
 
 LATER = {
     "learner.breeding_interval": "30",
@@ -58,19 +58,19 @@ LATER = {
     "learner.genes": "1",
     "learner.replay_draws": "1",
 }
-"""Parameters that descriptions may lack, and what they were before there was a choice."""
+"""Parameters that older descriptions lack, and the values that were then fixed."""
 
 
 def write_checkpoint(path: Path, description: Mapping[str, str], state: StateDict) -> None:
-    """Write a checkpoint completely or not at all.
+    """Write a checkpoint atomically.
 
     Parameters
     ----------
     path : Path
     description : mapping of str to str
-        All that decides the learning curve.
+        Everything that determines the learning curve.
     state : StateDict
-        With the reports of all generations as ``history``.
+        The state of the run, with the reports of all generations as ``history``.
     """
     stored = {STORED_NAMES.get(name, name): value for name, value in description.items()}
     buffer = io.BytesIO()
@@ -90,7 +90,7 @@ def generations_in(path: Path) -> int:
 
 
 def _stored(path: Path) -> StateDict:
-    """Read a checkpoint of any version; only where the content of the file is wrong, removing it is advised."""
+    """Read a checkpoint of any version; errors suggest removing the file only if its content is wrong."""
     source = str(path)
     try:
         with path.open("rb") as file:
@@ -114,8 +114,8 @@ def _unpacked(file: BinaryIO, source: str) -> StateDict:
         state: StateDict = torch.load(file, weights_only=True)
     except (OSError, MemoryError, torch.OutOfMemoryError):
         raise
-    except Exception as error:  # of many types, with messages about pickles
-        if "allocate memory" in str(error):  # torch raises a RuntimeError where the CPU has no memory left
+    except Exception as error:  # of many types, with messages about pickling
+        if "allocate memory" in str(error):  # torch raises a RuntimeError if it runs out of CPU memory
             raise MemoryError(str(error)) from error
         raise InputError(message, "", source) from error
     if not isinstance(state, dict) or not {"format", "description", "history"} <= state.keys():
@@ -124,7 +124,7 @@ def _unpacked(file: BinaryIO, source: str) -> StateDict:
 
 
 def read_checkpoint(path: Path, description: Mapping[str, str]) -> StateDict:
-    """Return the state in a checkpoint of a run with this description.
+    """Return the state of a run with this description from a checkpoint.
 
     Raises
     ------

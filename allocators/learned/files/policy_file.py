@@ -1,4 +1,4 @@
-"""Policy files: weights in safetensors, with metadata that must match; reading one never runs code."""
+"""Policy files: weights in safetensors, with metadata that must match; reading one never executes code."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -22,17 +22,17 @@ POLICY_FORMAT = "alloc-policy/1"
 def save_policy(
     path: Path | str, networks: Sequence[ActorCritic], method: str, training: Mapping[str, str | float] | None = None
 ) -> None:
-    """Write networks to a policy file, the best first.
+    """Write networks to a policy file, best first.
 
     Parameters
     ----------
     path : Path or str
     networks : sequence of ActorCritic
-        All of one size.
+        Networks of the same size.
     method : str
         The method that trained them.
     training : mapping, optional
-        Figures of the training, stored as metadata for information.
+        Figures of the training, stored as informational metadata.
     """
     tensors = {
         f"{number}.{name}": weight.contiguous()
@@ -48,7 +48,7 @@ def save_policy(
 
 
 def sorted_metadata(data: bytes) -> bytes:
-    """Return a safetensors file with its metadata sorted; the library writes them in random order."""
+    """Return a safetensors file with sorted metadata, which the library writes in random order."""
     end = 8 + int.from_bytes(data[:8], "little")
     header = json.loads(data[8:end])
     header["__metadata__"] = dict(sorted(header["__metadata__"].items()))
@@ -68,7 +68,7 @@ def _metadata(size: NetworkSize, count: int, method: str) -> dict[str, str]:
 
 
 def load_policy(path: Path | str, method: str | None, device: torch.device | None = None) -> list[ActorCritic]:
-    """Read the networks of a policy file, the best first, in evaluation mode and without gradients.
+    """Read the networks of a policy file, best first, in evaluation mode and without gradients.
 
     Parameters
     ----------
@@ -80,11 +80,11 @@ def load_policy(path: Path | str, method: str | None, device: torch.device | Non
     Raises
     ------
     InputError
-        If the file cannot be read, is of another method, or of other features or sizes than this version has, or
-        contains weights that are not finite.
+        If the file cannot be read, is for another method, has features or sizes that differ from those of this version,
+        or contains weights that are not finite.
     """
     source, metadata = str(path), read_header(path)
-    tensors = load(read_bytes(path))  # safetensors itself cannot open every file name
+    tensors = load(read_bytes(path))  # safetensors itself cannot open all file names
     try:
         size, count = NetworkSize(**json.loads(metadata["size"])), int(metadata["networks"])
     except (KeyError, TypeError, ValueError) as error:

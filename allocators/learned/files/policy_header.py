@@ -1,4 +1,4 @@
-"""The metadata of policy files; read without torch, so that mistakes are reported before it is imported."""
+"""The metadata of policy files, read without torch, so that errors are reported before it is imported."""
 
 import os
 from pathlib import Path
@@ -16,7 +16,7 @@ def read_header(path: Path | str) -> dict[str, str]:
     Raises
     ------
     InputError
-        If there is no such file, or it is not one of safetensors.
+        If there is no such file, or it is not a safetensors file.
     """
     of_type(path, (str, os.PathLike), "policy")
     source = os.fspath(path)

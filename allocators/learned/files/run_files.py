@@ -1,4 +1,4 @@
-"""The files of a training run, and the checks that none of another origin is overwritten; does not import torch."""
+"""The files of a training run, and checks that no other files are overwritten; does not import torch."""
 
 import zipfile
 from dataclasses import dataclass
@@ -17,9 +17,9 @@ class RunFiles:
     Attributes
     ----------
     policy : Path
-        The best networks up to now.
+        The best networks so far.
     checkpoint : Path
-        The whole run, to resume it.
+        The complete run, for resuming it.
     log : Path
         One CSV line per generation.
     tensorboard : Path or None
@@ -39,7 +39,7 @@ class RunFiles:
         log: Path | str | None = None,
         tensorboard: Path | str | None = None,
     ) -> "RunFiles":
-        """Return the files of a run; checkpoint and log are beside the policy by default, with their own suffixes."""
+        """Return the files of a run; by default, checkpoint and log are beside the policy, with their own suffixes."""
         output = Path(policy)
         return cls(
             output,
@@ -51,12 +51,12 @@ class RunFiles:
     def check(self, *, resume: bool) -> None:
         """Check that the run overwrites only its own files.
 
-        Empty files and checkpoints without a generation may be overwritten.
+        Empty files and checkpoints without generations may be overwritten.
 
         Raises
         ------
         InputError
-            If a file contains anything else, a run that is not resumed, or nothing to resume; or if the suffix of the
+            If a file has other content or a run that is not resumed, there is nothing to resume, or the suffix of the
             policy file is that of another format.
         """
         if resume and not self.checkpoint.exists():
@@ -77,7 +77,7 @@ class RunFiles:
             raise InputError(message, source=str(self.policy))
 
     def _check_checkpoint(self) -> None:
-        """Raise an `InputError` where the checkpoint to be overwritten is another file, or has generations."""
+        """Raise an `InputError` if the file to be overwritten is not a checkpoint, or has generations."""
         if not zipfile.is_zipfile(self.checkpoint):
             message = "is there already, and no checkpoint; name another checkpoint, or remove it"
             raise InputError(message, source=str(self.checkpoint))

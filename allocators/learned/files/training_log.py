@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 class Writer(Protocol):
-    """As much of TensorBoard's `SummaryWriter` as is used."""
+    """The methods of TensorBoard's `SummaryWriter` that are used."""
 
     def add_scalar(self, tag: str, scalar_value: float, global_step: int) -> object:
         """Add a value at a step."""
@@ -34,18 +34,18 @@ class TrainingLog:
     Parameters
     ----------
     kind : type of dataclass
-        Its fields are the columns; one is ``decisions``.
+        Type of a report; its fields, one of which is ``decisions``, are the columns.
     path : Path
-        CSV file; it is overwritten with `history`.
+        CSV file, which is overwritten with `history`.
     tensorboard : Path or None
         Folder for event files, whose steps are decisions of agents.
     history : sequence of `kind`
-        Generations before.
+        Previous generations.
 
     Raises
     ------
     InputError
-        If TensorBoard is asked for and not installed, or a file cannot be written.
+        If TensorBoard is required but not installed, or a file cannot be written.
     """
 
     def __init__(
@@ -102,6 +102,6 @@ def summary_writer() -> Callable[..., Writer]:
 
 
 def _event_writer(folder: Path, history: "Sequence[DataclassInstance]") -> Writer:
-    """Return a writer that purges what an interrupted run wrote after the end of `history`."""
+    """Return a writer that purges the events that an interrupted run wrote after the end of `history`."""
     following = asdict(history[-1])["decisions"] + 1 if history else 0
     return summary_writer()(str(folder), purge_step=following)

@@ -1,1 +1,1 @@
-"""The network that all policies share, in torch and in compiled loops."""
+"""The network architecture of all policies, in torch and in compiled loops."""

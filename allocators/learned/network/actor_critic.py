@@ -1,4 +1,4 @@
-"""The network that all methods share: attention over groups and tasks, and a small network that scores each bid."""
+"""The network architecture of all methods: attention over groups and tasks, and a small network that scores bids."""
 
 import math
 from dataclasses import dataclass
@@ -42,7 +42,7 @@ class NetworkSize:
 
 
 class Scores(NamedTuple):
-    """Scores of the bids in B states, and values of these.
+    """Scores of the bids in B states, and values of the states.
 
     Attributes
     ----------
@@ -62,10 +62,10 @@ class Scores(NamedTuple):
 class ActorCritic(nn.Module):
     """Scores bids (the actor, (7)) and states (the critic, (8)) for any number of agents and tasks.
 
-    Each group attends to its members, and the places to each other, the nearer the more: information of neighbours
-    reaches an agent in two steps, at a cost of O(n + m^2), not O(n^2). The score of a bid is the sum of two parts. The
-    local part depends on the features of agent and candidate alone, so that after a move only the pairs that it
-    touched are scored anew. The other, a pointer, compares the agent's group with the candidate's place.
+    Each group attends to its members, and the places attend to each other, depending on distance: information from
+    neighbours reaches an agent in two steps, at a cost of O(n + m^2) instead of O(n^2). The score of a bid is the sum
+    of two parts. The local part depends only on the features of agent and candidate, so that after a move only affected
+    pairs are scored again. The other, a pointer, compares the agent's group with the candidate's place.
 
     References
     ----------
@@ -156,10 +156,10 @@ def uninitialised(size: NetworkSize | None = None) -> ActorCritic:
 
 
 def initialised(size: NetworkSize | None, seed: int, count: int) -> list[ActorCritic]:
-    """Return networks with initial weights, drawn one after the other from one stream of random numbers.
+    """Return networks with initial weights, drawn one after another from one stream of random numbers.
 
-    The weights are those that torch draws by itself after `torch.manual_seed`, but no generator that is shared by the
-    process is touched.
+    The weights are the same as those that torch draws after `torch.manual_seed`, but the global generator is not
+    affected.
     """
     generator = torch.Generator().manual_seed(seed)
     networks = [uninitialised(size) for _ in range(count)]

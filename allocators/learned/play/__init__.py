@@ -1,1 +1,1 @@
-"""Playing the game by a policy: sampling of actions, rollouts, trajectories and transitions."""
+"""Playing the game with a policy: sampling of actions, rollouts, trajectories and transitions."""

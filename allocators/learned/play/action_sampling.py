@@ -30,14 +30,14 @@ def sample_actions(
 ) -> tuple[Tensor, Tensor]:
     """Draw the actions of a step.
 
-    With Gumbel noise on the scores, granting bids in their order draws them one after the other from the softmax over
-    all that share no task with those before (a Plackett-Luce model); agents that choose at once each draw from a
-    softmax of their own, in which staying scores 0.
+    With Gumbel noise on the scores, granting bids in order of score draws them successively from the softmax over all
+    bids that share no task with previous ones (a Plackett-Luce model). Agents that choose simultaneously each draw from
+    their own softmax, in which staying has the score 0.
 
     Parameters
     ----------
     temperature : float
-        Scores are divided by it; 0 takes the best.
+        Scores are divided by it; 0 selects the best.
 
     Returns
     -------
@@ -90,7 +90,7 @@ def log_probabilities(
     log_probability : Tensor, shape (B, k)
         0 where the action is -1.
     entropy : Tensor, shape (B,)
-        Of the first draw where agents bid, of the mean agent where they choose at once.
+        Entropy of the first draw if agents bid, or the mean over agents if they choose simultaneously.
     """
     if rules.turn == TurnRule.SIMULTANEOUS:
         logits = _with_staying(board, state, scores.bids, rules).log_softmax(2)

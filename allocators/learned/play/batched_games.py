@@ -1,4 +1,4 @@
-"""Playing many games from many beginnings, in compiled loops or by torch."""
+"""Playing many games from different starts, in compiled loops or by torch."""
 
 from collections.abc import Callable
 from dataclasses import fields, replace
@@ -18,7 +18,7 @@ from alloc.problems import Instance
 from alloc.problems.game import Board, make_board
 
 SLICE = 50_000
-"""Pairs times rounds that are played between two looks at the clock, some 5 to 25 ms."""
+"""Pairs times rounds that are played between two checks of the clock, about 5 to 25 ms."""
 
 
 class Games(NamedTuple):
@@ -30,7 +30,7 @@ class Games(NamedTuple):
     energy_weight : ndarray, shape (B,)
         Weight of energy.
     start : ndarray of int, shape (B, n)
-        The candidate where each agent begins.
+        Candidate at which each agent starts.
     """
 
     row: NDArray[np.int64]
@@ -49,26 +49,26 @@ def play_games(
     total: bool = False,
     should_stop: Callable[[], bool] = lambda: False,
 ) -> Best:
-    """Play games and return the best position of each: in compiled loops, or by torch where the network is elsewhere.
+    """Play games and return the best position of each, in compiled loops, or by torch if the network is on a GPU.
 
     Parameters
     ----------
     network : ActorCritic
     board : Board
-        In main memory.
+        A board in main memory.
     games : Games
-        What is played on it.
+        The games to play on it.
     rounds : int
-        Most rounds.
+        Maximum number of rounds.
     seed : int
-        Of the draws.
+        Seed of the draws.
     temperature, total, should_stop
-        As for `rollout.play`; games that a stop request leaves unplayed count as infinitely bad, but for the first.
+        As for `rollout.play`; games not played due to a stop request count as infinitely bad, except the first.
 
     Returns
     -------
     Best
-        In main memory.
+        The best positions, in main memory.
     """
     device = network.embed.weight.device
     if device.type == "cpu":
@@ -118,7 +118,7 @@ def _play_compiled(
 
 
 def warm_up(network: ActorCritic) -> None:
-    """Call every compiled loop once, so that no run waits for the compiler, or for a GPU to load its kernels."""
+    """Call every compiled loop once, so that no run has to wait for compilation, or for a GPU to load its kernels."""
     instance = Instance(ability=[1.0, 2.0], workload=[1.0, 1.0], task_position=np.eye(2), start_task=[0, 1])
     board = make_board([instance], [1.0], [1.0], np.random.default_rng(0))
     games = Games(np.zeros(1, dtype=np.int64), np.ones(1), board.start.numpy())

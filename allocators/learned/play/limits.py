@@ -1,22 +1,22 @@
-"""How large an instance a learned policy can play within a budget; does not import torch."""
+"""Limits on the size of instances that a learned policy can play within a budget; does not import torch."""
 
 from alloc.allocators.contract.budget import Budget
 from alloc.problems import Instance
 
 NEAR = 20
-"""Candidates per agent, besides being idle, in games on a whole instance."""
+"""Number of candidate tasks per agent, besides being idle, in games on a whole instance."""
 
 PAIRS_PER_SECOND = 40_000
-"""Pairs of agent and candidate of a game that takes a second on one slow core."""
+"""Pairs of agent and candidate in a game that takes a second on a slow core."""
 
 PLACES = 12
-"""Pairs of places, which attend to each other, that take as long as one pair of agent and candidate."""
+"""Pairs of places, between which there is attention, that take as long as one pair of agent and candidate."""
 
 LARGEST = 3_000_000
-"""Pairs beyond which one game takes more than a few gigabytes."""
+"""Number of pairs above which a game takes more than a few gigabytes."""
 
 MOST_TASKS = 4_000
-"""Tasks beyond which their attention to each other takes more than a few gigabytes."""
+"""Number of tasks above which the attention between them takes more than a few gigabytes."""
 
 
 def too_large(instance: Instance, budget: Budget) -> str | None:

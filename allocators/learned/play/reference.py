@@ -1,4 +1,4 @@
-"""The makespan at which the needs of a game are set."""
+"""The reference makespan, by which the needs of a game are set."""
 
 from alloc.problems import Instance, lp_makespan_lower_bound, makespan_lower_bound
 

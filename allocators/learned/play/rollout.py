@@ -1,4 +1,4 @@
-"""Batched games by torch; after a step only the pairs that its moves touched are scored anew."""
+"""Batched games by torch; after each step, only the pairs affected by its moves are scored again."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -24,25 +24,25 @@ from alloc.problems.game.board import SMALLEST
 from alloc.problems.game.observation import AgentAtPlace, pair_features, shortfalls
 
 SCORE_CHUNK = 250_000
-"""Pairs scored at once, to bound the memory."""
+"""Maximum number of pairs scored at once, to limit memory."""
 
 RESCORE_ALL = 0.5
-"""Share of touched pairs above which all are scored anew: gathering them costs more than it saves."""
+"""Share of affected pairs above which all pairs are scored again, as gathering them would cost more than it saves."""
 
 TIE = 1e-5
-"""Relative difference below which two figures in single precision are taken for equal."""
+"""Relative difference below which two figures in single precision count as equal."""
 
 
 @dataclass(frozen=True, eq=False)
 class Best:
-    """The best position that each game passed through: fewer unserved, then less shortfall, then nearer.
+    """The best position of each game: by fewer unserved tasks, then less shortfall, then less distance.
 
     Attributes
     ----------
     slot : Tensor of int, shape (B, n)
     unserved : Tensor, shape (B,)
     shortfall : Tensor, shape (B,)
-        Of the worst task where games are compared by makespan, of all together where by the total.
+        Shortfall of the worst task if games are compared by makespan, or total shortfall.
     distance : Tensor, shape (B,)
     """
 
@@ -101,13 +101,13 @@ def play(
     network : ActorCritic
     board : Board
     steps : int
-        Most steps.
+        Maximum number of steps.
     temperature : float
-        Scores are divided by it where bids are drawn; 0 grants the best bids.
+        Scores are divided by it before bids are drawn; 0 grants the best bids.
     generator : torch.Generator
-        For the draws.
+        Generator of the draws.
     total : bool
-        Whether positions are compared by the total shortfall, instead of that of the worst task.
+        Whether positions are compared by the total shortfall instead of that of the worst task.
     should_stop : callable
         Called before each step, and between chunks of the first scoring.
     """
@@ -129,7 +129,7 @@ def play(
 
 
 def step_and_score(board: Board, state: State, slot: Tensor, scores: "LocalScores") -> State:
-    """Make a step, and update the scores of the pairs that it touched."""
+    """Make a step, and update the scores of the affected pairs."""
     after = step(board, state, slot)
     scores.refresh(state, after)
     return after
@@ -166,7 +166,7 @@ class LocalScores:
         self.board, self.local = board, self.local[rows]
 
     def refresh(self, before: State, after: State) -> None:
-        """Score the pairs whose agent or candidate is at a place that changed."""
+        """Score the pairs whose agent or candidate is at a place whose group changed."""
         board = self.board
         changed = before.group != after.group
         changed[:, -1] = False

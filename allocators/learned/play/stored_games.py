@@ -1,4 +1,4 @@
-"""Boards, states and trajectories as dictionaries of tensors in checkpoints, whose names stay as they first were."""
+"""Boards, states and trajectories as dictionaries of tensors in checkpoints, with stable names."""
 
 from collections.abc import Mapping
 from dataclasses import fields
@@ -20,16 +20,16 @@ STORED_NAMES = {
     "location": "at",
     "flown": "hopped",
 }
-"""Names in checkpoints of the fields of `Board`, `State` and `Transitions` that are called otherwise there."""
+"""Names in checkpoints of the fields of `Board`, `State` and `Transitions` whose names differ there."""
 
 
 def to_stored(games: Board | State) -> dict[str, Tensor]:
-    """Return the fields of a board or state by their names in checkpoints."""
+    """Return the fields of a board or state, by their names in checkpoints."""
     return {stored_name(field.name): getattr(games, field.name) for field in fields(games)}
 
 
 def from_stored(kind: type[Stored], stored: Mapping[str, Tensor]) -> Stored:
-    """Return the board or state of which `to_stored` returned the fields."""
+    """Return the board or state whose fields `to_stored` returned."""
     return kind(**{field.name: stored[stored_name(field.name)] for field in fields(kind)})
 
 

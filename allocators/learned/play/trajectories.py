@@ -1,4 +1,4 @@
-"""Trajectories to learn from, and the advantages of their actions."""
+"""Trajectories for learning, and the advantages of their actions."""
 
 from dataclasses import dataclass, fields
 
@@ -20,21 +20,21 @@ from alloc.problems.game import (
 
 @dataclass(frozen=True, eq=False)
 class Trajectories:
-    """Trajectories of B games over S steps, with at most k moves a step.
+    """Trajectories of B games over S steps, with at most k moves per step.
 
     Attributes
     ----------
     board : Board
     state : State
-        Before each step; all arrays begin with (S, B).
+        States before each step; the shapes of all arrays begin with (S, B).
     actions : Tensor of int, shape (S, B, k)
-        As `sample_actions` returns them, filled up with -1.
+        As `sample_actions` returns them, padded with -1.
     log_probability : Tensor, shape (S, B, k)
-        Of each action, by the behaviour policy.
+        Log-probability of each action under the behaviour policy.
     value, reward : Tensor, shape (S, B)
-        Value of the state before the step, and rise of the utility.
+        Value of the state before the step, and increase of the utility.
     last_value : Tensor, shape (B,)
-        Value of the state after the last step, 0 in games that had ended; truncated games have not.
+        Value of the state after the last step, 0 in games that have ended; truncated games have not.
     """
 
     board: Board
@@ -47,17 +47,17 @@ class Trajectories:
 
     @property
     def alive(self) -> Tensor:
-        """Whether each game was still on before each step, shape (S, B)."""
+        """Whether each game was still running before each step, shape (S, B)."""
         return ~self.state.done
 
     @property
     def decisions(self) -> int:
-        """Decisions of agents, those to stop included."""
+        """Number of decisions of agents, including those to stop."""
         return int((self.actions >= 0).sum())
 
     @property
     def evaluations(self) -> int:
-        """States that the network evaluated."""
+        """Number of states that the network evaluated."""
         return int(self.alive.sum())
 
 
@@ -115,18 +115,18 @@ def advantages(
     gae_lambda: float,
     importance_ratio: Tensor | None = None,
 ) -> Tensor:
-    """Generalised advantage estimation, (9) and (10), shape (S, B).
+    """Return the advantages by generalised advantage estimation, (9) and (10), shape (S, B).
 
     Parameters
     ----------
     reward, value : Tensor, shape (S, B)
     alive : Tensor of bool, shape (S, B)
-        Whether the game was still on before each step.
+        Whether the game was still running before each step.
     last_value : Tensor, shape (B,)
-        Value after the last step, 0 where the game is over.
+        Value after the last step, 0 if the game is over.
     importance_ratio : Tensor, shape (S, B), optional
-        How much likelier each step is by the policy that learns than by the one that played; those up to 1 cut the
-        trace short, as in V-trace (Espeholt et al. 2018, arXiv:1802.01561). 1 by default.
+        Probability ratio of each step under the learning policy to the behaviour policy; ratios below 1 cut the trace,
+        as in V-trace (Espeholt et al. 2018, arXiv:1802.01561). 1 by default.
     """
     result = torch.zeros_like(reward)
     following, later = last_value, torch.zeros_like(last_value)

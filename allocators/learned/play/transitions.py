@@ -1,9 +1,9 @@
-"""One move at a time: what a round of bids looks like to methods that learn the value of a single move.
+"""Rounds of bids as transitions of single moves, for methods that learn the value of a single move.
 
-The bids of a round share no task and are granted one after the other. So a round is also a path of single moves in
-the game in which one bid is granted at a time: each granted bid is a transition from the state after the bids
-granted before it, and brings its marginal contribution. Methods that may learn from any policy's moves (DQN, DDPG)
-thus learn from all bids of a round, while the round costs one look of the network.
+The bids of a round share no task and are granted one after another. A round is thus also a sequence of single moves in
+the game in which one bid is granted at a time: each granted bid is a transition from the state after the previously
+granted bids, and its reward is its marginal contribution. Off-policy methods (DQN, DDPG) thus learn from all bids of a
+round, which costs one evaluation of the network.
 """
 
 from typing import Any, NamedTuple
@@ -30,21 +30,21 @@ from alloc.problems.game import (
 )
 
 FIRST = 1e6
-"""Score that comes before all others."""
+"""Score that is higher than all others."""
 
 
 class Transitions(NamedTuple):
-    """N granted bids in games of one board, as compact as they can be kept.
+    """N granted bids in games of one board, in a compact form.
 
-    What follows is not kept: the game is deterministic, and `after` plays the bid again. That agents stopped is not
-    kept either: it ends the game and brings 0, which needs no learning.
+    The next state is not stored: the game is deterministic, and `next_state` plays the bid again. Stopping is not
+    stored either: it ends the game with value 0, which needs no learning.
 
     Attributes
     ----------
     board : Board
     game : Tensor of int16, shape (N,)
-        Number of the game on the board.
-    slot, at : Tensor of int16, shape (N, n)
+        Index of the game on the board.
+    slot, location : Tensor of int16, shape (N, n)
         As in `State`, before the bid.
     flown : Tensor, shape (N, n)
     visited : Tensor of uint8, shape (N, ceil(n * c / 8))
@@ -64,7 +64,7 @@ class Transitions(NamedTuple):
     reward: Tensor
 
     def rows(self, index: Tensor) -> tuple[Board, State, Tensor, Tensor]:
-        """Return board and state before each of these bids, the bid and what it brought."""
+        """Return board and state before each of these bids, the bid and its reward."""
         board, slot = self.board[self.game[index].long()], self.slot[index].long()
         _, n, c = board.shape
         left = np.unpackbits(self.visited[index].numpy(), axis=1, count=n * c).astype(bool)
@@ -80,7 +80,7 @@ class Transitions(NamedTuple):
 
 
 class Played(NamedTuple):
-    """What playing brought: transitions, decisions of agents, states that the network evaluated, and mean reward."""
+    """Result of playing: transitions, decisions of agents, states that the network evaluated, and mean reward."""
 
     transitions: Transitions
     decisions: int
@@ -104,15 +104,15 @@ def play(
     Parameters
     ----------
     temperature : float
-        Of the noise, see `sample_actions`.
+        Temperature of the noise, see `sample_actions`.
     exploring : float
-        Share of the rounds in which any bid, all being equally likely, is granted before the others: also where the
-        network would stop at once, and so never learn what it misses.
+        Share of the rounds in which a uniformly random bid is granted before the others, also if the network would
+        stop, as it would otherwise never learn what it misses.
 
     Raises
     ------
     InputError
-        If all agents choose at once: then what one of them brings depends on all others.
+        If all agents choose simultaneously, as the contribution of one agent then depends on all others.
     """
     if rules.turn == TurnRule.SIMULTANEOUS:
         raise InputError("dqn and ddpg learn the value of one move at a time: they play the turn rule `bidding` only")
@@ -148,7 +148,7 @@ def _exploring(
 
 
 def _single_moves(board: Board, state: State, actions: Tensor, brought: Tensor) -> list[tuple[Tensor, ...]]:
-    """Take a round task_distance: the fields of `Transitions` for each of its bids."""
+    """Split a round into single moves: return the fields of `Transitions` for each of its bids."""
     _, n, c = board.shape
     columns: list[tuple[Tensor, ...]] = []
     for action, reward in zip(actions.unbind(1), brought.unbind(1), strict=True):
@@ -181,16 +181,16 @@ def next_state(board: Board, state: State, action: Tensor) -> State:
 
 
 def scores_above_reserve(bids: Tensor, reserve: Tensor, board: Board, state: State, rules: Rules) -> Tensor:
-    """Return what each bid, and in the last column stopping, is scored above stopping; shape (B, n * c + 1).
+    """Return the scores of all bids, and of stopping in the last column, minus that of stopping; shape (B, n * c + 1).
 
-    ``-inf`` where an agent may not bid; the last column is 0.
+    They are ``-inf`` if an agent may not bid; the last column is 0.
     """
     above = (bids - reserve[:, None, None]).masked_fill(~action_mask(board, state, rules), -torch.inf)
     return torch.cat([above.flatten(1), torch.zeros_like(reserve)[:, None]], 1)
 
 
 class TransitionMemory:
-    """The latest transitions, up to `capacity`; those of the oldest board go first."""
+    """The latest transitions, up to `capacity`; those of the oldest board are dropped first."""
 
     def __init__(self, capacity: int) -> None:
         self.capacity = capacity
@@ -201,7 +201,7 @@ class TransitionMemory:
         return sum(len(one.action) for one in self.kept)
 
     def add(self, new: Transitions) -> None:
-        """Keep what was played on a board."""
+        """Add the transitions of a board."""
         if len(new.action):
             self.kept.append(new)
         while len(self) > self.capacity:

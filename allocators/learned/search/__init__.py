@@ -1,1 +1,1 @@
-"""From a policy to a plan: games on the whole instance and on its regions."""
+"""Planning with a policy, by games on the whole instance and on its regions."""

@@ -1,4 +1,4 @@
-"""Fine-tuning of the policies on the instance to be solved: PPO on games of its regions, and breeding."""
+"""Fine-tuning of policies on the instance to be solved: PPO on games on its regions, and breeding."""
 
 import copy
 import time
@@ -25,20 +25,20 @@ BREEDING = BreedingParameters(mutation_sigma=0.002)
 
 @dataclass(frozen=True)
 class FineTuningParameters:
-    """How policies are fine-tuned.
+    """Parameters of fine-tuning.
 
     Attributes
     ----------
     after_s : float
-        Seconds of play before any learning: short runs are better spent on play.
+        Seconds of playing before learning begins, as short runs are better spent on playing.
     share : float
-        Share of the time thereafter that is spent on learning.
+        Share of the subsequent time that is spent on learning.
     games, pairs : int
-        Most games of an update, and most pairs of agent and candidate in them.
+        Maximum number of games in an update, and of pairs of agent and candidate in them.
     rounds : int
-        Most rounds of a game.
+        Maximum number of rounds of a game.
     energy_weight : (float, float)
-        Least and most weight of energy.
+        Minimum and maximum weight of energy.
     ppo : PpoParameters
     """
 
@@ -61,7 +61,7 @@ class _RegionGames:
     parameters: FineTuningParameters
 
     def draw(self, rng: np.random.Generator, progress: float) -> Board:
-        """Draw a board on which each agent begins at the nearest task or where the plan has it."""
+        """Draw a board on which each agent starts at the nearest task or at its task in the plan."""
         board = self.regions.board
         games = max(1, min(self.parameters.games, self.parameters.pairs // (board.shape[1] * board.shape[2])))
         rows = torch.from_numpy(rng.integers(len(board.energy_weight), size=games))
@@ -76,18 +76,18 @@ class _RegionGames:
         )
 
     def max_steps(self, board: Board) -> int:
-        """Most rounds."""
+        """Return the maximum number of rounds."""
         return self.parameters.rounds
 
 
 class FineTuning:
-    """Fine-tuning of a population on one instance: its members learn in turn, and are bred now and then.
+    """Fine-tuning of a population on one instance, whose members learn in turn and are bred periodically.
 
     Parameters
     ----------
     search : Search
     networks : sequence of ActorCritic
-        As shipped; they are not changed.
+        The shipped networks, which are not changed.
     parameters : FineTuningParameters, optional
     """
 
@@ -102,13 +102,13 @@ class FineTuning:
         self._stats: list[TrainingStats] = []
 
     def is_due(self) -> bool:
-        """Return whether it is time to learn; runs without a time limit never learn, so that they repeat."""
+        """Return whether it is time to learn; runs without a time limit never learn, so that they are reproducible."""
         since = self.search.elapsed_s - self.parameters.after_s
         limit = self.search.budget.time_limit_s
         return limit is not None and since > 0 and self.spent_s < self.parameters.share * since
 
     def learn(self, regions: Regions) -> Sequence[ActorCritic]:
-        """Train the next member on these regions; return the networks as they are now."""
+        """Train the next member on these regions; return the current networks."""
         begin = time.monotonic()
         if not self.members:
             self.members = [_learner(network, self.parameters.ppo) for network in self.shipped]
@@ -122,7 +122,7 @@ class FineTuning:
         return [member.policy for member in self.members]
 
     def _breed(self) -> None:
-        """Replace the less fit, by the rewards of their last updates (12)."""
+        """Breed the next generation; the fitness (12) is that in the last updates."""
         count = len(self.members)
         latest = [self._stats[number::count][-GENERATION:] for number in range(count)]
         self._stats = []
@@ -132,7 +132,7 @@ class FineTuning:
             [sum(stats.evaluations for stats in member) for member in latest],
             BREEDING,
         )
-        members = [copy.deepcopy(member.state_dict()) for member in self.members]  # loading one changes what it shares
+        members = [copy.deepcopy(member.state_dict()) for member in self.members]  # loading changes shared tensors
         for member, state in zip(self.members, breed(members, scores, BREEDING, self.jobs), strict=True):
             member.load_state_dict(copy.deepcopy(state))
 

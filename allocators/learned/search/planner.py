@@ -1,4 +1,4 @@
-"""From a policy to a plan: games on the whole instance, then on regions of it until the budget ends."""
+"""Planning with a policy: games on the whole instance, then on regions of it until the budget ends."""
 
 import math
 from collections.abc import Sequence
@@ -28,19 +28,19 @@ from alloc.problems.game.regions import Regions, lay_out_regions
 Ints = NDArray[np.int64]
 
 STREAMS = 2
-"""Batches of games played side by side, in as many threads if the run may have them."""
+"""Number of batches of games played concurrently, in as many threads if these are available."""
 
 WHOLE_ROUNDS = 16
-"""Most rounds of a game on the whole instance, plus twice the mean number of agents a task, or once the number that the
-largest task needs."""
+"""Maximum number of rounds of a game on the whole instance, to which twice the mean number of agents per task, or the
+number that the largest task needs, is added."""
 
 SECOND_GAME = 0.15
-"""Share of the budget after which no second game on the whole instance is begun."""
+"""Share of the budget after which no second game on the whole instance is started."""
 
 
 @dataclass(frozen=True)
 class PlannerParameters:
-    """How a policy is used.
+    """Parameters of planning with a policy.
 
     Attributes
     ----------
@@ -49,31 +49,32 @@ class PlannerParameters:
     pairs_per_stream : int
         Pairs of agent and candidate in the games of a stream.
     games_per_region : int
-        Most games on one region in a stream.
+        Maximum number of games on one region in a stream.
     region_tasks : (int, int)
-        Least and most tasks of a region.
+        Minimum and maximum number of tasks of a region.
     extra_tasks, random_share : int, float
-        How much larger regions may be at full stagnation, and the share of them then that are of random tasks.
+        Number of additional tasks of regions at full stagnation, and share of regions with random tasks at that point.
     rounds : int
-        Most rounds of a game on a region; more games bring more than more rounds.
+        Maximum number of rounds of a game on a region; more games are better than more rounds.
     restart_share : float
-        Share of the games on regions in which all agents begin at the nearest task.
+        Share of the games on regions in which all agents start at the nearest task.
     moved : (float, float)
-        Least and most probability of an agent to begin at the nearest task in the other games; else it begins where
-        the plan has it.
+        Minimum and maximum probability that an agent starts at the nearest task in the other games, instead of at its
+        task in the plan.
     scattered_share : float
-        Share of the streams in which agents begin at a random candidate instead of the nearest.
+        Share of the streams in which agents start at a random candidate instead of the nearest task.
     scattered : (float, float)
-        Least and most probability of an agent to do so.
+        Minimum and maximum probability that an agent does so.
     temperature : (float, float)
-        Least and most of what scores are divided by in games on regions.
+        Minimum and maximum temperature of scores in games on regions.
     patience : int
-        Sweeps over all regions without success after which the target is a longer makespan; see `TargetMakespan`.
+        Number of sweeps over all regions without success after which the target makespan is raised; see
+        `TargetMakespan`.
     makespan_share : float
-        Share of the budget after which energy counts, if it does, even if the makespan may not be the least.
+        Share of the budget after which games are for energy, if it counts, even if the makespan may not be minimal.
     first_energy_weight, second_energy_weight : float
-        Weight of energy in the first game, which is the first answer; and in the second, where games on regions begin
-        if energy counts: it is easier to make up for a shortfall than to save energy.
+        Weight of energy in the first game, which gives the first answer, and in the second game, from which games on
+        regions start if energy counts, as repairing a shortfall is easier than saving energy.
     """
 
     near: int = NEAR
@@ -95,17 +96,17 @@ class PlannerParameters:
 
 
 ENERGY_WEIGHTS = {Objective.MAKESPAN: (0.2, 0.8), Objective.MAKESPAN_ENERGY: (0.6, 3.0)}
-"""Least and most weight of energy in games on regions."""
+"""Minimum and maximum weight of energy in games on regions."""
 
 
 class Planner:
-    """One run of a policy, or of several, on one instance.
+    """A run of one or more policies on an instance.
 
     Parameters
     ----------
     search : Search
     networks : sequence of ActorCritic
-        The best first.
+        The networks, best first.
     parameters : PlannerParameters, optional
     tuning : FineTuning, optional
         Fine-tunes the networks between sweeps.
@@ -128,7 +129,7 @@ class Planner:
         self.plan = np.full(search.instance.n, IDLE)
 
     def run(self) -> None:
-        """Play until the budget ends; every improvement has been submitted by then."""
+        """Play until the budget ends, and submit every improvement."""
         self.play_whole(self.parameters.first_energy_weight)
         if not (self.instance.workload > 0).any():
             return
@@ -154,12 +155,12 @@ class Planner:
         self._continue_from(np.where(place == instance.m, IDLE, place))
 
     def _late(self) -> bool:
-        """Whether a game must stop: before there is any plan, only when the time itself is up or on a stop request."""
+        """Return whether a game must stop; if there is no plan yet, only at the time limit or on a stop request."""
         search = self.search
         return search.should_stop() if search.best is not None else search.interrupted or search.remaining_s <= 0
 
     def _continue_from(self, plan: Ints) -> None:
-        """Submit a plan, with all tasks served that can be, and make it the one to be improved."""
+        """Submit a plan that serves as many tasks as possible, and make it the current one."""
         allocation = Allocation(plan)
         if not np.isin(np.flatnonzero(self.instance.workload > 0), plan).all():
             allocation = serve_all(self.instance, allocation)
@@ -167,7 +168,7 @@ class Planner:
         self.plan = allocation.task_of_agent
 
     def _sweep(self) -> None:
-        """Partition the tasks into regions, play each many times, and keep what is better."""
+        """Partition the tasks into regions, play many games on each, and keep improvements."""
         search, target = self.search, self.target
         assert search.best is not None
         if target.update(self.plan):
@@ -185,13 +186,13 @@ class Planner:
             self._continue_from(regions.merge(self.plan, slots, accepted))
 
     def _learn(self, tuning: FineTuning, regions: Regions) -> None:
-        """Fine-tune the networks; should that fail, use them as they were, and learn no more."""
+        """Fine-tune the networks; if that fails, return to the shipped ones without further learning."""
         self.networks, self.tuning = tuning.shipped, None
         with self.search.improving("fine-tuning"):
             self.networks, self.tuning = tuning.learn(regions), tuning
 
     def _partition(self, surplus: NDArray[np.float64]) -> tuple[Ints, list[Ints]]:
-        """Partition the tasks into regions; return their tasks and agents: those there, and idle ones in reach."""
+        """Partition the tasks into regions; return their tasks, and their agents including idle ones within reach."""
         instance, rng = self.instance, self.rng
         low, high = self.parameters.region_tasks
         is_short = bool((surplus < 0).any())
@@ -228,9 +229,9 @@ class Planner:
         Returns
         -------
         accepted : ndarray of bool, shape (G,)
-            Where the best game is better than the plan.
+            Whether the best game is better than the plan.
         slots : ndarray of int, shape (G, k)
-            Those of the best game.
+            Slots of the agents in the best game.
         """
         streams = [self._games(regions, energy_weights) for _ in range(STREAMS)]
         temperatures = self.rng.uniform(*self.parameters.temperature, STREAMS).tolist()
@@ -259,7 +260,7 @@ class Planner:
         return found.better_than(now).numpy(), found.slot.numpy()
 
     def _games(self, regions: Regions, energy_weights: tuple[float, float]) -> Games:
-        """Return several games on every region, from various starts and at various weights of energy."""
+        """Return several games on every region, with different starts and weights of energy."""
         parameters, rng, board, count = self.parameters, self.rng, regions.board, len(regions.tasks)
         pairs = board.shape[1] * board.shape[2]
         games = count * int(np.clip(parameters.pairs_per_stream // (count * pairs), 1, parameters.games_per_region))
@@ -277,5 +278,5 @@ class Planner:
 
 
 def most_helpers(board: Board) -> int:
-    """Return how many mean agents the largest task needs, at most all there are: one joins it in a round."""
+    """Return how many agents of mean ability the largest task needs, at most all agents; one joins it per round."""
     return min(board.shape[1], math.ceil(float(board.need.max())))

@@ -1,4 +1,4 @@
-"""Partitions of the tasks into regions: neighbours, or tasks on the ways by which agents can reach a shortfall."""
+"""Partitions of the tasks into regions of neighbours, or of tasks through which agents can reach a shortfall."""
 
 import numpy as np
 import scipy.sparse
@@ -12,7 +12,7 @@ Ints = NDArray[np.int64]
 Floats = NDArray[np.float64]
 
 SPREAD = (0.6, 1.4)
-"""Least and most of what distances, and the lengths of edges, are multiplied by, to vary the regions."""
+"""Minimum and maximum random factor on distances, and on the lengths of edges, which varies the regions."""
 
 
 def partition(
@@ -23,23 +23,24 @@ def partition(
     random_share: float = 0.0,
     graph: scipy.sparse.csr_array | None = None,
 ) -> Ints:
-    """Partition tasks into regions of neighbours, shape (regions, size); some are left over.
+    """Partition tasks into regions of neighbours, shape (regions, size); some tasks may be left over.
 
-    Each region is a task and those left over that are nearest to it, distances being perturbed. Where tasks have a
-    shortfall, only they get a region, with the nearest whose surplus makes up for it and, with a graph, those on the
-    way from there.
+    Each region consists of a task and the remaining tasks that are nearest to it by perturbed distances. If there are
+    tasks with a shortfall, only these get a region, with the nearest tasks whose surplus compensates for it and, given
+    a graph, the tasks on the paths from there.
 
     Parameters
     ----------
     position : ndarray, shape (m, 3)
     surplus : ndarray, shape (m,)
-        Negative for a shortfall.
+        Surplus of each task; negative for a shortfall.
     size : int
-        Tasks of a region.
+        Number of tasks of a region.
     random_share : float
-        Share of the regions that are of random tasks.
+        Share of the regions that consist of random tasks.
     graph : sparse array, shape (m, m), optional
-        Its shortest paths are the distances from a task with a shortfall, instead of those in space; see `reach_graph`.
+        Distances from a task with a shortfall are shortest paths in this graph instead of those in space; see
+        `reach_graph`.
     """
     m = len(position)
     position = np.nan_to_num(position)
@@ -68,7 +69,7 @@ def partition(
 
 
 def _helpers(centre: int, away: Floats, surplus: Floats, predecessor: Ints | None, room: int) -> list[int]:
-    """Return the nearest tasks with a surplus, until they make up for the shortfall, and those on the way."""
+    """Return the nearest tasks with a surplus, until they compensate for the shortfall, and the tasks on the paths."""
     shortfall, chosen = -surplus[centre], set[int]()
     able = np.flatnonzero((surplus > 0) & np.isfinite(away))
     for helper in able[np.argsort(away[able])].tolist():
@@ -83,7 +84,7 @@ def _helpers(centre: int, away: Floats, surplus: Floats, predecessor: Ints | Non
 
 
 def _path(predecessor: Ints, first: int, last: int) -> list[int]:
-    """Return the tasks from the first to just before the last; none where there is no path."""
+    """Return the tasks on the path from `first` to `last`, without the last; empty if there is no path."""
     path = []
     while first != last:
         if first < 0:
@@ -94,7 +95,7 @@ def _path(predecessor: Ints, first: int, last: int) -> list[int]:
 
 
 def reach_graph(near: Candidates, plan: Ints, m: int, rng: np.random.Generator) -> scipy.sparse.csr_array:
-    """Return a graph with an edge from each task to those whose agents could come, shape (m, m).
+    """Return a graph with an edge from each task to those whose agents could do it, shape (m, m).
 
     Parameters
     ----------

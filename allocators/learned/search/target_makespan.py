@@ -1,4 +1,4 @@
-"""The makespan that games on regions are to reach: the lower bound first, then what seems achievable."""
+"""The target makespan of games on regions: first the lower bound, then what appears to be achievable."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,53 +11,53 @@ from alloc.problems.game.layout import SHORTEST_HOURS, working_share
 Ints = NDArray[np.int64]
 
 BOUND_UNLIMITED_S = 30.0
-"""Seconds that the first bound may take where there is no time limit: runs that count iterations have to repeat."""
+"""Seconds for the first bound without a time limit, enough for runs limited by iterations to be reproducible."""
 
 BOUND_SHARE = 0.1
-"""Share of the time limit that the first bound may take."""
+"""Share of the time limit for the first bound."""
 
 ROUNDING = 1e-9
-"""Share of the need by which a group may differ and still count as sufficient."""
+"""Relative tolerance on the need of a task."""
 
 CHECK_SHARE, CHECK_SWEEPS = 0.1, 5
-"""Share of the budget, and sweeps, between two checks of how far the shortfall has fallen."""
+"""Share of the budget, and number of sweeps, between two checks of the decrease of the shortfall."""
 
 TOO_SLOW = 0.5
-"""Share of the shortfall at the last check below which it must be at the next, or the target is given up."""
+"""The target is given up if the shortfall at a check exceeds this share of that at the previous check."""
 
 SMALL_SHORTFALL, FEW_TASKS = 0.002, 0.1
-"""A shortfall is small, so that only patience ends a target, if it is no more than this share of all needs or one mean
-ability, and no more than this share of the tasks, or two tasks, are short."""
+"""A shortfall is small, so that a target is given up only after `patience` sweeps, if it is at most this share of all
+needs or one mean ability, and at most this share of the tasks, or two tasks, are short."""
 
 GRACE_SWEEPS = 5
-"""Sweeps without success that do not count as stagnation."""
+"""Number of sweeps without success that do not count as stagnation."""
 
 
 class TargetMakespan:
-    """The makespan that games on regions are to reach, as a run goes on.
+    """The target makespan of games on regions in the course of a run.
 
-    The first target is the best lower bound. A target is given up on stagnation, or where the shortfall falls too
-    slowly; the next one is halfway to the makespan reached. Once no better makespan is possible, or most of the budget
-    is spent, the target is the makespan reached, and games are for energy, if the objective has it.
+    The first target is the best lower bound. A target is given up on stagnation, or if the shortfall decreases too
+    slowly; the next one is halfway to the best makespan so far. When no better makespan is possible, or most of the
+    budget is spent, the target is the best makespan so far, and games minimise energy if it is part of the objective.
 
     Parameters
     ----------
     search : Search
     instance : Instance
-        Of the search, without what cannot be served.
+        Instance of the search, without tasks that cannot be served.
     patience : int
-        Sweeps over all regions without success after which a target is given up.
+        Number of sweeps over all regions without success after which a target is given up.
     makespan_share : float
-        Share of the budget after which energy counts even if the makespan may not be the least.
+        Share of the budget after which games are for energy even if the makespan may not be minimal.
 
     Attributes
     ----------
     hours : float
-        The target.
+        The target makespan.
     failed : float
-        A makespan that could not be reached, or is a lower bound.
+        A makespan that could not be reached, or a lower bound.
     stale : int
-        Sweeps since the shortfall last fell.
+        Number of sweeps since the shortfall last decreased.
     """
 
     def __init__(self, search: Search, instance: Instance, patience: int, makespan_share: float) -> None:
@@ -75,7 +75,7 @@ class TargetMakespan:
         return reference_makespan(self.instance, BOUND_UNLIMITED_S if limit is None else BOUND_SHARE * limit)
 
     def _given_limit(self) -> float:
-        """Hours that the user gave, up to which a plan need be no faster."""
+        """Return the makespan limit of the user in hours, below which a plan need not be faster; 0 without one."""
         energy_counts = self.search.objective is Objective.MAKESPAN_ENERGY
         return self.search.tolerance.limit or 0.0 if energy_counts else 0.0
 
@@ -86,7 +86,7 @@ class TargetMakespan:
         self._checked, self._sweeps, self._short_tasks = self.spent, 0, 0
 
     def update(self, plan: Ints) -> bool:
-        """Choose the target for the next sweep; return whether games are for energy alone from here on."""
+        """Choose the target of the next sweep; return whether games are only for energy from now on."""
         search = self.search
         assert search.fastest is not None
         reached = search.fastest.evaluation.served_makespan
@@ -105,9 +105,9 @@ class TargetMakespan:
         return False
 
     def surplus(self, plan: Ints) -> NDArray[np.float64]:
-        """Return the ability at each task beyond its need at the target, negative for a shortfall, shape (m,).
+        """Return the ability at each task minus its need at the target, shape (m,); negative for a shortfall.
 
-        It is 0 for a task without anyone: the plan serves as many tasks as can be, and no region of it serves more.
+        It is 0 for a task without agents: the plan serves as many tasks as possible, so no region can serve more.
         """
         instance = self.instance
         agent = np.flatnonzero(plan != IDLE)
@@ -128,7 +128,7 @@ class TargetMakespan:
 
     @property
     def stagnation(self) -> float:
-        """How much of the patience is used up, from 0 to 1."""
+        """Used share of the patience, from 0 to 1."""
         return min(1.0, max(0, self.stale - GRACE_SWEEPS) / max(1, self.patience - GRACE_SWEEPS))
 
     def _is_too_slow(self) -> bool:
@@ -144,7 +144,7 @@ class TargetMakespan:
         return slow
 
     def _balanced(self, plan: Ints) -> float:
-        """Hours that the plan would take with its work divided evenly, flights included; 0 without finite speeds."""
+        """Return the makespan of the plan with evenly divided work, including flights; 0 without finite speeds."""
         instance = self.instance
         agent = np.flatnonzero(plan != IDLE)
         if not np.isfinite(instance.speed).any() or not len(agent):
@@ -155,7 +155,7 @@ class TargetMakespan:
 
     @property
     def spent(self) -> float:
-        """Share of the budget that is spent."""
+        """Used share of the budget."""
         search, budget = self.search, self.search.budget
         of_time = search.elapsed_s / budget.time_limit_s if budget.time_limit_s else 0.0
         return max(of_time, search.iteration / budget.iterations if budget.iterations else 0.0)

@@ -1,6 +1,6 @@
 """Training of policies: curriculum, validation, the training run, and tuning.
 
-`train` is the whole of it as a function; it is imported when it is first used, since it needs torch.
+`train` does all of it as a function; it is imported on first use, as it needs torch.
 """
 
 from typing import TYPE_CHECKING

@@ -1,7 +1,7 @@
-"""The curriculum: games on small instances of many kinds, drawn anew for every update.
+"""The curriculum: games on small instances of many kinds, drawn for every update.
 
-Sizes are below those of the paper's scenarios, which are never trained on. Seeds are disjoint from all others: from
-10^9 on for training, from 2 * 10^9 on for validation.
+Sizes are below those of the paper's scenarios, which are never used for training. Seeds are disjoint from all others:
+from 10^9 on for training, and from 2 * 10^9 on for validation.
 """
 
 from collections.abc import Sequence
@@ -19,7 +19,7 @@ TRAINING_SEED = 10**9
 
 @dataclass(frozen=True)
 class TrainingInstance:
-    """An instance, and its reference makespan T_ref in hours: a lower bound, which sets the target of its games."""
+    """An instance and its reference makespan T_ref in hours, a lower bound that sets the target of its games."""
 
     instance: Instance
     reference_h: float
@@ -27,14 +27,14 @@ class TrainingInstance:
 
 @dataclass(frozen=True)
 class Curriculum:
-    """The distribution of the games that are trained on.
+    """The distribution of training games.
 
     Attributes
     ----------
     families : tuple of str
-        Of `families.FAMILIES`; each game draws one of them.
+        Names in `families.FAMILIES`, one of which is drawn for each game.
     initial_tasks, tasks : (int, int)
-        Minimum and maximum number of tasks, at the beginning of the training and after `growth_fraction` of it.
+        Minimum and maximum number of tasks at the beginning of the training, and after `growth_fraction` of it.
     growth_fraction : float
         Share of the training after which sizes have their full range.
     agents_per_task : (float, float)
@@ -43,15 +43,15 @@ class Curriculum:
     energy_weight : (float, float)
         Minimum and maximum weight of energy, drawn log-uniformly.
     relaxed_fraction, max_relaxation : float
-        Share of games whose target makespan is longer than T_ref, and the largest factor: there is more ability than
-        needed, and some agents may stay idle.
+        Share of games whose target makespan is longer than T_ref, and the largest factor; there is then more ability
+        than needed, and some agents may stay idle.
     max_pairs : int
-        Approximate number of agent-place pairs on a board, whatever the size of its games, so that updates take
+        Approximate number of agent-place pairs on a board, independent of the size of its games, so that updates take
         equally long.
     games : (int, int)
         Minimum and maximum number of games on a board.
     instances : tuple of TrainingInstance
-        Given instances to play instead of drawn ones.
+        Given instances to play in place of drawn ones.
     """
 
     families: tuple[str, ...] = ("mixed",)
@@ -96,13 +96,13 @@ class Curriculum:
         return with_reference(instances)
 
     def _given(self, rng: np.random.Generator) -> list[TrainingInstance]:
-        """Draw from the given instances of one size, that of a random one."""
+        """Draw from the given instances that have the size of a random one."""
         first = self.instances[int(rng.integers(len(self.instances)))].instance
         alike = [one for one in self.instances if (one.instance.n, one.instance.m) == (first.n, first.m)]
         return [alike[int(number)] for number in rng.integers(0, len(alike), self._count(first.n, first.m))]
 
     def _count(self, n: int, m: int) -> int:
-        """Return the number of games of this size on a board."""
+        """Return the number of games on a board of games of this size."""
         least = self.games[0] if n * (m + 1) <= self.max_pairs else 1
         return int(np.clip(self.max_pairs // (n * (m + 1)), least, self.games[1]))
 

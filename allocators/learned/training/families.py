@@ -1,4 +1,4 @@
-"""Families of instances to train on: each stresses one property, and `varied` combines them all."""
+"""Families of training instances: each stresses one property, and `varied` combines all of them."""
 
 from collections.abc import Callable, Iterable
 
@@ -21,7 +21,7 @@ def _real(n: int, m: int, rng: np.random.Generator) -> Family:
 
 
 def _elsewhere(n: int, m: int, rng: np.random.Generator) -> Family:
-    """Integer workloads that can be matched exactly, as in the paper, and agents that start anywhere."""
+    """Return integer workloads that can be matched exactly, as in the paper, with agents that start anywhere."""
     return Family(agents=n, tasks=m, workload="dirichlet", starts="own", dimensions=_dimensions(rng), battery=None)
 
 
@@ -64,7 +64,7 @@ def _short_range(n: int, m: int, rng: np.random.Generator) -> Family:
 
 
 def _travel(n: int, m: int, rng: np.random.Generator) -> Family:
-    """Travel takes from 5 % to 50 % of the time of the work alone."""
+    """Return a family whose travel times are 5 % to 50 % of the time of the work alone."""
     return Family(
         agents=n,
         tasks=m,
@@ -85,7 +85,7 @@ def _priority(n: int, m: int, rng: np.random.Generator) -> Family:
 
 
 def _unbalanced(n: int, m: int, rng: np.random.Generator) -> Family:
-    """Total ability from 0.7 to 2 times the total workload, so that shares of ability are fractional."""
+    """Return a family whose total ability is 0.7 to 2 times the total workload, so that ability is shared unevenly."""
     return Family(agents=n, tasks=m, load=1 / rng.uniform(0.7, 2.0))
 
 
@@ -135,10 +135,10 @@ RECIPES: dict[str, Recipe] = {
 }
 
 FAMILIES = ("mixed", "paper", *RECIPES)
-"""Names of all families; `mixed` draws instances like the paper's and all others."""
+"""Names of all families; `mixed` draws instances like those of the paper and of all other families."""
 
 PAPER_SHARE = 0.4
-"""Share of instances like the paper's in `mixed`."""
+"""Share of instances like those of the paper in `mixed`."""
 
 
 def check_families(names: Iterable[str]) -> None:
@@ -154,12 +154,12 @@ def draw_instance(family: str, n: int, m: int, seed: int, rng: np.random.Generat
     Parameters
     ----------
     n, m : int
-        Agents and tasks.
+        Numbers of agents and tasks.
     seed : int
         Seed of the instance; `rng` draws the parameters of its family.
     """
     if family == "mixed":
-        kinds = ("elsewhere", "elsewhere", *RECIPES)  # doubled: games on parts of an instance look like it
+        kinds = ("elsewhere", "elsewhere", *RECIPES)  # doubled, as games on parts of an instance resemble it
         family = "paper" if rng.random() < PAPER_SHARE else kinds[int(rng.integers(len(kinds)))]
     if family == "paper":
         least = max(4 * n, m * (m + 1) // 2)

@@ -1,4 +1,4 @@
-"""Limits of a training run: when it ends, and how much of it is done."""
+"""Limits of a training run, and its progress."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,12 +9,12 @@ from alloc.problems.arguments import real, whole
 
 @dataclass(frozen=True)
 class Limits:
-    """When a training run ends: at the first limit that is reached. All count from the beginning of the run.
+    """Limits of a training run, which ends at the first one reached; all count from the beginning of the run.
 
     Attributes
     ----------
     steps : int or None
-        Decisions of agents, of all members together, >= 0.
+        Decisions of agents, summed over all members, >= 0.
     iterations : int or None
         Generations, >= 0.
     minutes : float or None
@@ -35,7 +35,7 @@ class Limits:
                 object.__setattr__(self, name, check(value, name))
 
     def progress(self, history: Sequence[Report]) -> float:
-        """Return the share of the training that is done, 0 to 1: of the steps, else the generations, else the time."""
+        """Return the progress of the training, 0 to 1: by steps, or else generations, or else time."""
         decisions, seconds = _spent(history)
         for limit, done in (
             (self.steps, decisions),
@@ -58,5 +58,5 @@ class Limits:
 
 
 def _spent(history: Sequence[Report]) -> tuple[int, float]:
-    """Return the decisions and the seconds of a run up to now."""
+    """Return the decisions and the seconds of a run so far."""
     return (history[-1].decisions, history[-1].seconds) if history else (0, 0.0)

@@ -1,4 +1,4 @@
-"""The training loop: generation after generation, with all files written after each."""
+"""The training loop, which writes all files after each generation."""
 
 from collections.abc import Callable
 
@@ -22,17 +22,17 @@ def run_training(
 ) -> None:
     """Train until a limit is reached, with checkpoint, policy and log written after every generation.
 
-    The checkpoint is written first and contains what the other files say: a run that is killed between two of them
-    repairs the others when it is resumed.
+    The checkpoint is written first and contains the content of the other files, so that a run that is killed between
+    two writes repairs the others when it is resumed.
 
     Parameters
     ----------
     trainer : PopulationTraining
     files : RunFiles
-        The policy file gets the networks of all members of the best generation, the best first.
+        The policy file contains the networks of all members of the best generation, best first.
     limits : Limits
     engine : Engine, optional
-        Where the members are trained; one after the other in this process by default.
+        Engine that trains the members; by default one after another in this process.
     should_stop : callable
         As for `Engine.map`; an unfinished generation is dropped.
     on_report : callable
@@ -53,7 +53,7 @@ def run_training(
                 return
             try:
                 trainer.save(files.checkpoint)
-            finally:  # the disk may have room for one of the two
+            finally:  # there may be disk space for one of the two
                 if report.generation == trainer.best_generation:
                     trainer.write_policy(files.policy)
             lines.append(report)
@@ -67,7 +67,7 @@ def _advanced(
     engine: Engine | None,
     should_stop: Callable[[], bool],
 ) -> Report | None:
-    """Return the report of another generation; what the engine says gets how to go on."""
+    """Train another generation and return its report; errors of the engine are extended by how to resume."""
     try:
         return trainer.advance(limits, engine, should_stop)
     except EngineError as error:

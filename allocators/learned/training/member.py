@@ -19,18 +19,18 @@ Weights = dict[str, torch.Tensor]
 
 
 class MemberJob(NamedTuple):
-    """The training of one member in a generation, as it is sent to wherever it is run.
+    """The training of one member in a generation, in a form that can be sent to another process.
 
     Attributes
     ----------
     parameters : TrainingParameters
     state : StateDict
-        Of the member's learner.
+        State of the member's learner.
     job : TrainingJob
     boards : sequence of Board
         Validation games.
     threads : int
-        Threads of torch; the result depends on them in the last bits.
+        Threads of torch; the last bits of the result depend on them.
     """
 
     parameters: TrainingParameters
@@ -41,7 +41,7 @@ class MemberJob(NamedTuple):
 
 
 class MemberResult(NamedTuple):
-    """Result of a `MemberJob`: the learner's new state, its policy's weights, and how both came out."""
+    """Result of a `MemberJob`: the learner's new state, its policy's weights, and statistics of both."""
 
     state: StateDict
     policy: Weights
@@ -50,23 +50,23 @@ class MemberResult(NamedTuple):
 
 
 def initial_state(parameters: TrainingParameters, seed: int, weights: Weights | None = None) -> StateDict:
-    """Return the state of an untrained member, whose policy has the given weights where there are any."""
+    """Return the state of an untrained member, whose policy has the given weights, if any."""
     learner = new_learner(parameters.method, parameters.network, parameters.learner, seed)
     if weights is not None:
         learner.policy.load_state_dict(weights)
     state = learner.state_dict()
     for target, source in (("target", "network"), ("targets", "networks")):
-        if target in state:  # target networks begin as copies, of given weights as well
+        if target in state:  # target networks begin as copies, also of given weights
             state[target] = copy.deepcopy(state[source])
     return state
 
 
 def train_member(job: MemberJob) -> MemberResult:
-    """Train a member and validate its policy: a pure function of the job, wherever it is run."""
+    """Train a member and validate its policy; a pure function of the job."""
     parameters = job.parameters
     with plain_torch(), torch_threads(job.threads):
         learner = new_learner(parameters.method, parameters.network, parameters.learner, 0)
-        learner.load_state_dict(copy.deepcopy(job.state))  # optimisers go on writing to the tensors they are given
+        learner.load_state_dict(copy.deepcopy(job.state))  # optimisers write to the tensors that they are given
         stats = learner.train_on(job.job)
         validation = validate(learner.policy, job.boards, parameters.rules, parameters.curriculum)
         policy = {name: weight.clone() for name, weight in learner.policy.state_dict().items()}

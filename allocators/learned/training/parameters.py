@@ -1,4 +1,4 @@
-"""Parameters of a training run, and their description by which a checkpoint is recognised."""
+"""Parameters of a training run, and their description, which identifies a checkpoint."""
 
 import hashlib
 from dataclasses import asdict, dataclass, field, fields, replace
@@ -14,16 +14,16 @@ from alloc.problems.game import FEATURE_SET, PLANNING, Rules
 
 @dataclass(frozen=True)
 class TrainingParameters:
-    """Parameters of a training run; together with the seed they decide the whole learning curve.
+    """Parameters of a training run; together with the seed, they determine the learning curve.
 
     Attributes
     ----------
     method : str
         One of `registry.METHODS`.
     population : int
-        Members that learn; several are bred between generations.
+        Number of members that learn; several are bred between generations.
     decisions : int
-        Decisions of agents in a generation, for each member.
+        Decisions of agents per generation and member.
     network : NetworkSize
     learner : Hyperparameters or None
         Hyperparameters of the method; None for its defaults.
@@ -34,7 +34,7 @@ class TrainingParameters:
     Raises
     ------
     InputError
-        If a population of more than one is asked of a method that cannot be bred.
+        If the population is larger than one, but the method cannot be bred.
     """
 
     method: str = "gappo"
@@ -52,7 +52,7 @@ class TrainingParameters:
 
 
 def described(parameters: TrainingParameters, seed: int) -> dict[str, str]:
-    """Return all that decides the learning curve, flat and as text."""
+    """Return everything that determines the learning curve, as a flat mapping of text."""
     instances = parameters.curriculum.instances
     plain = replace(parameters, curriculum=replace(parameters.curriculum, instances=()))
     text = {"seed": str(seed), "features": FEATURE_SET, "validation": VALIDATION, **_flat("", asdict(plain))}

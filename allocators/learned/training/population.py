@@ -1,4 +1,4 @@
-"""What every training of a population does between generations: rank, keep the best, breed, and save the run."""
+"""The steps between generations of any population: rank, keep the best, breed, and save the run."""
 
 import time
 from abc import ABC, abstractmethod
@@ -19,7 +19,7 @@ from alloc.allocators.parallel.engine import Engine, never_stop
 
 
 class PopulationTraining(ABC):
-    """A training run of a population that can be stopped at any moment and resumed to the same learning curve.
+    """A training run of a population, which can be stopped at any time and resumed with the same learning curve.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ class PopulationTraining(ABC):
     history : list of Report
         One report per generation.
     best : list of weights
-        The networks of the generation with the lowest cost, the best first.
+        The networks of the generation with the lowest cost, best first.
     """
 
     def __init__(self, breeding: BreedingParameters, seed: int, members: list[StateDict]) -> None:
@@ -51,7 +51,7 @@ class PopulationTraining(ABC):
 
     @property
     def best_generation(self) -> int:
-        """The generation with the best networks, 0 before the first."""
+        """The generation with the best networks, from 1; 0 before the first."""
         return best_generation(self.history)
 
     def progress(self, limits: Limits) -> float:
@@ -74,20 +74,20 @@ class PopulationTraining(ABC):
         Parameters
         ----------
         limits : Limits, optional
-            Limits of the whole run, which its schedules follow.
+            Limits of the whole run, on which schedules depend.
         engine : Engine, optional
-            Where the members are trained; one after the other in this process by default.
+            Engine that trains the members; by default one after another in this process.
         should_stop : callable
             As for `Engine.map`.
 
         Returns
         -------
         Report or None
-            None if `should_stop` returned True before the generation was complete; nothing is changed then.
+            None if `should_stop` returned True before the generation was complete; nothing has changed then.
         """
 
     def _conclude(self, results: Sequence[MemberResult], began: float, *, breeds: bool = True) -> Report:
-        """Add a generation that began at a `time.monotonic`, and breed the next one, or leave the members alone."""
+        """Record a generation that began at `began` (`time.monotonic`), and breed the next one if `breeds`."""
         scores = self._fitness(results)
         ranking = sorted(range(len(results)), key=lambda member: results[member].validation.cost)
         report = next_report(self.history, results, ranking[0], max(scores), time.monotonic() - began)
@@ -110,16 +110,16 @@ class PopulationTraining(ABC):
         )
 
     def _mixed_seed(self, number: int) -> int:
-        """Return a seed that is mixed from that of the run, the generation and a number."""
+        """Return a seed derived from that of the run, the generation and a number."""
         mixed = np.random.SeedSequence((self.seed, self.generation, number)).generate_state(1, np.uint64)
         return int(mixed[0] >> np.uint64(1))
 
     @abstractmethod
     def _description(self) -> dict[str, str]:
-        """Return all that decides the learning curve, as text."""
+        """Return everything that determines the learning curve, as text."""
 
     def _state(self) -> dict[str, object]:
-        """Return what a checkpoint holds."""
+        """Return the content of a checkpoint."""
         return {
             "members": self.members,
             "history": [asdict(report) for report in self.history],
@@ -127,16 +127,16 @@ class PopulationTraining(ABC):
         }
 
     def save(self, path: Path) -> None:
-        """Write a checkpoint of the whole run, from which `resume` continues as without a break."""
+        """Write a checkpoint of the whole run, from which `resume` continues as if there was no interruption."""
         write_checkpoint(path, self._description(), self._state())
 
     def resume(self, path: Path) -> StateDict:
-        """Restore the run of a checkpoint, and return all that it holds.
+        """Restore the run from a checkpoint, and return the checkpoint's content.
 
         Raises
         ------
         InputError
-            If there is no checkpoint of this version at `path`, or it is one of another method, seed or parameters.
+            If there is no checkpoint of this version at `path`, or it has another method, seed or parameters.
         """
         state = read_checkpoint(path, self._description())
         self.members, self.best = state["members"], state["best"]
@@ -145,10 +145,10 @@ class PopulationTraining(ABC):
 
     @abstractmethod
     def write_policy(self, path: Path) -> None:
-        """Write the best networks up to now to a policy file."""
+        """Write the best networks so far to a policy file."""
 
     def _figures(self) -> dict[str, str | float]:
-        """Return the figures of the best generation that a policy file tells."""
+        """Return the figures of the best generation for the metadata of a policy file."""
         report = self.history[self.best_generation - 1]
         return {
             "seed": self.seed,

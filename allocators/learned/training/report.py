@@ -1,4 +1,4 @@
-"""Reports: the figures of each generation, one line of the log."""
+"""Reports: the figures of a generation, which form one line of the log."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,21 +15,21 @@ class Report:
     Attributes
     ----------
     generation : int
-        From 1.
+        Number of the generation, from 1.
     decisions, evaluations : int
-        Decisions of agents, and states evaluated by networks, up to now by all members together.
+        Decisions of agents, and states evaluated by networks, so far and summed over all members.
     cost, unserved, time, distance, others_time : float
-        Of the best member; see `Validation`.
+        Validation figures of the best member; see `Validation`.
     best_cost : float
-        The lowest cost up to now.
+        The lowest cost so far.
     fitness : float
-        (12) of the fittest member.
+        Fitness (12) of the fittest member.
     reward, entropy, divergence, learning_rate : float
-        Of the best member's training; see `TrainingStats`, whose `approx_kl` is the divergence.
+        Training figures of the best member; see `TrainingStats`, whose `approx_kl` is the divergence.
     seconds : float
-        Training time up to now.
+        Training time so far.
     decisions_per_second : float
-        In this generation.
+        Decisions of agents per second in this generation.
     """
 
     generation: int
@@ -51,7 +51,7 @@ class Report:
 
 
 def best_generation(history: Sequence[Report]) -> int:
-    """Return the generation with the lowest cost, from 1; 0 where there is none."""
+    """Return the generation with the lowest cost, from 1; 0 if there is none."""
     costs = [report.cost for report in history]
     return 1 + int(np.argmin(costs)) if costs else 0
 
@@ -64,11 +64,11 @@ def next_report(
     Parameters
     ----------
     results : sequence of MemberResult
-        Of all members.
+        Results of all members.
     best : int
         Index of the member with the lowest cost.
     fitness : float
-        Of the fittest member.
+        Fitness of the fittest member.
     seconds : float
         Duration of this generation.
     """

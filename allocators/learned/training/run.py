@@ -1,4 +1,4 @@
-"""Training as a function: what `alloc train` does, for programs; torch is imported once all options are checked."""
+"""Training as a function, equivalent to `alloc train`; torch is imported after all options have been checked."""
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -19,10 +19,10 @@ if TYPE_CHECKING:
     from alloc.allocators.learned.training.trainer import Trainer
 
 DEFAULT_STEPS = 500_000
-"""Decisions of agents where no limit is given."""
+"""Number of decisions of agents if no limit is given."""
 
 DEFAULT_POPULATION = 4
-"""Networks of `gappo`; all other methods train one."""
+"""Number of networks of `gappo`; all other methods train one."""
 
 
 def train(
@@ -51,9 +51,9 @@ def train(
     on_start: "Callable[[Trainer, Limits], None]" = lambda trainer, limits: None,
     on_report: "Callable[[Report], None]" = lambda report: None,
 ) -> "Trainer":
-    """Train a learned method, and write the best policy up to now after each generation.
+    """Train a learned method, and write the best policy so far after each generation.
 
-    With `steps` or `iterations` the same seed trains the same policy, on any engine; with `minutes` alone the schedules
+    With `steps` or `iterations`, the same seed gives the same policy on any engine; with only `minutes`, schedules
     follow the clock.
 
     Parameters
@@ -63,39 +63,39 @@ def train(
     output : Path or str
         Policy file to write, for `load` and ``--policy``.
     steps : int, optional
-        Decisions of agents of the whole run, by all members together; `DEFAULT_STEPS` where no limit is given.
+        Decisions of agents in the whole run, summed over all members; `DEFAULT_STEPS` if no limit is given.
     minutes : float, optional
         Minutes of the whole run.
     iterations : int, optional
         Generations of the whole run.
     patience : int, optional
-        Consecutive generations without better networks after which the run ends.
+        Number of consecutive generations without better networks after which the run ends.
     families : sequence of str
-        Families of instances to train on; see `families.FAMILIES`.
+        Families of training instances; see `families.FAMILIES`.
     instances : sequence of Instance, optional
-        Instances to train on instead; of five or more a fifth is held out for validation, see `hold_out`.
+        Training instances in place of families; of five or more, a fifth is held out for validation, see `hold_out`.
     init : Path or str, optional
         Policy file with the initial networks.
     population : int, optional
-        Networks that are trained and bred, for ``gappo`` only; `DEFAULT_POPULATION` by default.
+        Number of networks that are trained and bred, for ``gappo`` only; `DEFAULT_POPULATION` by default.
     decisions : int
-        Decisions of agents between two generations, for each network.
+        Decisions of agents per generation and network.
     parameters : Hyperparameters or mapping, optional
-        Hyperparameters of the method, or values of some of them by name, as numbers or as text.
+        Hyperparameters of the method, or values of some of them by name, as numbers or text.
     turn, reward : str
         Rules of the games; see `alloc.problems.game.Rules`.
     seed : int
         Seed of all random numbers.
     resume : bool
-        Whether to continue the run of the checkpoint.
+        Whether to continue the run in the checkpoint.
     checkpoint, log : Path or str, optional
-        The whole run, and one CSV line per generation; beside `output` by default.
+        Files for the complete run, and for one CSV line per generation; beside `output` by default.
     tensorboard : Path or str, optional
         Folder for event files.
     engine : Engine, optional
-        Where the networks are trained, see `make_engine`; one after the other in this process by default.
+        Engine that trains the networks, see `make_engine`; by default one after another in this process.
     should_stop : callable
-        Whether to stop; the unfinished generation is dropped.
+        Returns whether to stop; an unfinished generation is dropped.
     on_start : callable
         Called with the trainer and the limits of the run before the first generation.
     on_report : callable
@@ -104,13 +104,13 @@ def train(
     Returns
     -------
     Trainer
-        With the reports of all generations as ``history``.
+        The trainer, with the reports of all generations as ``history``.
 
     Raises
     ------
     InputError
-        If a parameter is out of range, options exclude each other, a file cannot be read, or one would be overwritten
-        that is not of this run.
+        If a parameter is out of range, options exclude each other, a file cannot be read, or a file of another origin
+        would be overwritten.
     TrainingError
         If the engine gives up; the run can be resumed.
     """
@@ -129,7 +129,7 @@ def train(
     from alloc.allocators.learned.training.setup import new_trainer
 
     if tensorboard is not None:
-        summary_writer()  # raises where TensorBoard is not installed; a writer would already purge its folder
+        summary_writer()  # raises if TensorBoard is not installed; creating a writer would already purge its folder
     if steps is None and minutes is None and iterations is None:
         steps = DEFAULT_STEPS
     limits = Limits(steps, iterations, minutes, patience)
@@ -145,12 +145,12 @@ def train(
 
 
 def _hyperparameters(method: str, parameters: Hyperparameters | Mapping[str, object] | None) -> Hyperparameters:
-    """Return the hyperparameters of a method from what `train` is given.
+    """Return the hyperparameters of a method from the argument of `train`.
 
     Raises
     ------
     InputError
-        If there is no such method, or the hyperparameters are not its own or out of range.
+        If there is no such method, or the hyperparameters are of another method or out of range.
     """
     if parameters is None or isinstance(parameters, Mapping):
         return method_parameters(method, parameters)

@@ -1,4 +1,4 @@
-"""A new trainer from the options of a training run."""
+"""Creation of a trainer from the options of a training run."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -30,7 +30,7 @@ def new_trainer(
 ) -> Trainer:
     """Return the trainer of a new run; see `train` for the parameters.
 
-    The networks have the size of those of `init`, where it is given.
+    The networks have the same size as those of `init`, if it is given.
     """
     initial = [] if init is None else load_policy(init, None)
     curriculum = Curriculum(tuple(families))

@@ -24,7 +24,7 @@ from alloc.problems.game import Board
 
 
 class Trainer(PopulationTraining):
-    """A training run in games; see `PopulationTraining`.
+    """A training run on games; see `PopulationTraining`.
 
     Parameters
     ----------
@@ -34,8 +34,8 @@ class Trainer(PopulationTraining):
     boards : sequence of Board, optional
         Validation games; those of the curriculum by default.
     init : sequence of weights, optional
-        Initial weights of the members' policies, assigned in turn; by default all members have the same random
-        weights, so that those of two members can be blended.
+        Initial weights of the members' policies, assigned in turn; by default, all members have the same random
+        weights, so that the weights of two members can be blended.
     """
 
     def __init__(
@@ -70,7 +70,7 @@ class Trainer(PopulationTraining):
         return None if results is None else self._conclude(results, began)
 
     def _job(self, member: int, limits: Limits) -> TrainingJob:
-        """Return the next training job of a member, the last ones cut to the steps that are left."""
+        """Return the next training job of a member, limited to the remaining steps."""
         parameters, decisions = self.parameters, self.parameters.decisions
         if limits.steps is not None:
             left = limits.steps - (self.history[-1].decisions if self.history else 0)

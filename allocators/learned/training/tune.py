@@ -1,4 +1,4 @@
-"""Tuning of hyperparameters: many short trainings, the unpromising ones pruned.
+"""Tuning of hyperparameters by many short trainings, of which unpromising ones are pruned.
 
 References
 ----------
@@ -36,18 +36,18 @@ LOG_SPACES: dict[str, tuple[float, float] | tuple[int, int]] = {
     "target_update_interval": (20, 500),
     "temperature": (0.02, 1.0),
 }
-"""Bounds of the hyperparameters that are sampled log-uniformly; a method is tuned in those that it has and uses."""
+"""Bounds of hyperparameters that are sampled log-uniformly; only those that a method has and uses are tuned."""
 
 UNIFORM_SPACES: dict[str, tuple[float, float]] = {
     "gamma": (0.4, 1.0),
     "clip_coef": (0.05, 0.4),
     "gae_lambda": (0.8, 1.0),
 }
-"""Bounds of those that are sampled uniformly."""
+"""Bounds of hyperparameters that are sampled uniformly."""
 
 
 class Sampler(Protocol):
-    """As much of `optuna.Trial` as samples values."""
+    """The methods of `optuna.Trial` that sample values."""
 
     def suggest_float(self, name: str, low: float, high: float, *, log: bool = False) -> float:
         """Return a number from `low` to `high`."""
@@ -57,7 +57,7 @@ class Sampler(Protocol):
 
 
 def suggested(trial: Sampler, default: Hyperparameters) -> dict[str, float]:
-    """Sample the hyperparameters of a trial; those that are None in `default` stay so."""
+    """Sample the hyperparameters of a trial; those that are None in `default` remain None."""
     values: dict[str, float] = {}
     for field in fields(default):
         name = field.name
@@ -74,12 +74,12 @@ def suggested(trial: Sampler, default: Hyperparameters) -> dict[str, float]:
 
 
 def open_study(path: Path, method: str, seed: int) -> "optuna.Study":
-    """Open the study of a method in an SQLite file, which is created where it does not exist.
+    """Open the study of a method in an SQLite file, which is created if it does not exist.
 
     Raises
     ------
     InputError
-        If Optuna is not installed, or the file is not one of studies.
+        If Optuna is not installed, or the file does not contain studies.
     """
     try:
         import optuna
@@ -96,7 +96,7 @@ def open_study(path: Path, method: str, seed: int) -> "optuna.Study":
             load_if_exists=True,
             pruner=optuna.pruners.MedianPruner(n_startup_trials=5, n_warmup_steps=1),
         )
-        study.sampler = optuna.samplers.TPESampler(seed=seed + len(study.trials))  # a resumed study draws anew
+        study.sampler = optuna.samplers.TPESampler(seed=seed + len(study.trials))  # a resumed study draws other numbers
         return study
     except MemoryError:
         raise
@@ -115,23 +115,23 @@ def tune(
     boards: list[Board] | None = None,
     on_trial: Callable[["optuna.Study", "optuna.trial.FrozenTrial"], None] = lambda study, trial: None,
 ) -> None:
-    """Train with sampled hyperparameters until the study has so many finished trials.
+    """Train with sampled hyperparameters until the study has `trials` finished trials.
 
-    Every trial has its own seed, so that no hyperparameters win by a lucky one. The first trial of a study has the
+    Every trial has its own seed, so that no hyperparameters win by a lucky seed. The first trial of a study uses the
     defaults.
 
     Parameters
     ----------
     study : optuna.Study
-        As `open_study` returns it.
+        A study from `open_study`.
     parameters : TrainingParameters
-        Of each training, but for the hyperparameters sampled.
+        Parameters of each training except the sampled hyperparameters.
     trials : int
-        Finished trials, those already in the study included.
+        Number of finished trials, including those already in the study.
     limits : Limits
-        Of each training.
+        Limits of each training.
     seed : int
-        Seed of the first trial; those of the others follow.
+        Seed of the first trial; the others have consecutive seeds.
     boards : list of Board, optional
         Validation games; those of the curriculum by default.
     on_trial : callable

@@ -1,4 +1,4 @@
-"""Validation of policies: greedy games on fixed instances that are never trained on."""
+"""Validation of policies by greedy games on fixed instances that are never used for training."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -17,7 +17,7 @@ from alloc.problems.game import Board, Rules, make_board, mean_distance, relativ
 from alloc.problems.generate import paper_like
 
 VALIDATION = "shortfall-1"
-"""Identifier of the definition of `cost`; runs with another one are not resumed."""
+"""Identifier of the definition of `cost`; runs with another definition cannot be resumed."""
 
 VALIDATION_SEED = 2 * 10**9
 
@@ -28,10 +28,10 @@ DISTANCE_WEIGHT = 0.25
 """Weight of the distance per agent in `cost`: a sixth of the minimum energy weighs as much as 0.5 % of the makespan."""
 
 MAX_HELD_OUT = 24
-"""Maximum number of given instances to validate on."""
+"""Maximum number of given instances for validation."""
 
 MAX_NAMES = 10
-"""Maximum number of instances that a note names."""
+"""Maximum number of instances named in a note."""
 
 
 @dataclass(frozen=True)
@@ -41,17 +41,17 @@ class Validation:
     Attributes
     ----------
     cost : float
-        Criterion by which the best networks are selected, to be minimised: mean over the boards of 1 - T_ref / T, which
-        no single bad game can dominate, plus the weighted distance, plus 1 for each unserved task.
+        Selection criterion for the best networks, to be minimised: mean over the boards of 1 - T_ref / T, which no
+        single bad game can dominate, plus the weighted distance, plus 1 for each unserved task.
     unserved : float
-        Mean over the boards of the unserved tasks in a game: their part of the cost.
+        Mean over the boards of the unserved tasks in a game, which are part of the cost.
     time, distance : float
-        Mean T / T_ref, and mean distance per agent in the board's scale, on the first board: instances like the
-        paper's scenario 1, or the given ones.
+        Mean T / T_ref, and mean distance per agent in the board's scale, on the first board, which has instances like
+        those of the paper's scenario 1, or given ones.
     others_time : float
         Harmonic mean of T / T_ref on the other boards, where the bound T_ref cannot always be attained.
     reward : float
-        Increase of the utility in a game: the cumulative reward of (12).
+        Increase of the utility in a game, which is the cumulative reward of (12).
     """
 
     cost: float
@@ -63,7 +63,7 @@ class Validation:
 
 
 def validation_boards(curriculum: Curriculum) -> list[Board]:
-    """Return the fixed games on which networks are compared: like the paper's, and of the families."""
+    """Return the fixed games for comparing networks: on instances like those of the paper, and of the families."""
     rng = np.random.default_rng(VALIDATION_SEED)
     seeds = iter(range(VALIDATION_SEED, VALIDATION_SEED + 1000))
     kinds = [[paper_like(100, 20, 400, next(seeds)) for _ in range(12)]]
@@ -74,10 +74,10 @@ def validation_boards(curriculum: Curriculum) -> list[Board]:
 
 
 def hold_out(instances: Sequence[Instance]) -> tuple[list[Instance], list[Instance]]:
-    """Split instances into a training set and a validation set: a fifth of them, drawn with a fixed seed.
+    """Split instances into a training set, and a validation set of a fifth of them, drawn with a fixed seed.
 
-    Instances without any work are left out, as every allocation of them costs nothing. Fewer than five others are all
-    in both sets.
+    Instances without work are left out, as every allocation of them costs nothing. If fewer than five are left, both
+    sets contain all of them.
 
     Raises
     ------
@@ -95,7 +95,7 @@ def hold_out(instances: Sequence[Instance]) -> tuple[list[Instance], list[Instan
 
 
 def games_on(instances: Sequence[Instance], curriculum: Curriculum) -> tuple[Curriculum, list[Board]]:
-    """Return `curriculum` on given instances, and boards of those to validate on; see `hold_out`."""
+    """Return `curriculum` with given instances, and boards of those for validation; see `hold_out`."""
     train, held = hold_out(instances)
     sizes: dict[tuple[int, int], list[TrainingInstance]] = {}
     for one in with_reference(held[:MAX_HELD_OUT]):
@@ -105,7 +105,7 @@ def games_on(instances: Sequence[Instance], curriculum: Curriculum) -> tuple[Cur
 
 
 def split_notes(instances: Sequence[Instance]) -> list[str]:
-    """Return sentences that say which instances are left out, and which are held out for validation."""
+    """Return notes on the instances that are left out, and on those that are held out for validation."""
     train, held = hold_out(instances)
     notes = []
     idle = sum(not (instance.workload > 0).any() for instance in instances)
@@ -128,7 +128,7 @@ def _board(games: Sequence[TrainingInstance], rng: np.random.Generator) -> Board
 
 @torch.no_grad()
 def validate(network: ActorCritic, boards: Sequence[Board], rules: Rules, curriculum: Curriculum) -> Validation:
-    """Play `boards` greedily, and evaluate the best position of each game."""
+    """Play `boards` greedily, and return the mean figures of the best position of each game."""
     played = [_play(network, board, rules, 2 * curriculum.max_steps(board)) for board in boards]
     others = torch.cat([outcome.time for outcome in played[1:] or played])
     return Validation(
@@ -152,7 +152,7 @@ class _Outcome(NamedTuple):
 
 
 def _play(network: ActorCritic, board: Board, rules: Rules, steps: int) -> _Outcome:
-    """Play a board, and return the figures of the best position of each game."""
+    """Play a board, and return the figures of each game's best position."""
     state = reset(board)
     start = utility(board, state, rules)
     best = _Outcome(torch.full_like(start, torch.inf), start, start, start, start)
