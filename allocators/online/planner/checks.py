@@ -1,4 +1,4 @@
-"""Whether what a planner is told can be so, by what it believes; nothing is changed here."""
+"""Consistency checks of inputs with the planner's state, which they do not modify."""
 
 from alloc.allocators.online.planner.inputs import Report
 from alloc.allocators.online.planner.state import LiveState
@@ -11,17 +11,17 @@ STANDING = {AgentStatus.ABSENT: "absent", AgentStatus.AWAY: "away", AgentStatus.
 
 
 def check_hour(state: LiveState, hour: float) -> None:
-    """Raise `InputError` for an hour that has passed, or is after the end of the mission."""
+    """Raise `InputError` for an hour in the past, or after the end of the mission."""
     if hour < state.hour:
-        raise InputError(f"is {hour:g}, but it is hour {state.hour:g} already; events come in order", "hour")
+        raise InputError(f"is {hour:g}, but it is already hour {state.hour:g}; events come in order", "hour")
     if hour > state.mission.horizon:
         raise InputError(f"is {hour:g}, after the mission ends at {state.mission.horizon:g}", "hour")
 
 
 def check_event(state: LiveState, event: Event) -> None:
-    """Raise `InputError` if an event cannot happen as things are.
+    """Raise `InputError` if an event cannot happen in the present state.
 
-    A task that is believed to be done may have work left: whatever happens to an open one may happen to it.
+    A task that the planner assumes to be done may have work left, so the same events as for open tasks are accepted.
     """
     agent = None if event.agent is None else state.agent(event.agent)
     task = None if event.task is None else state.task(event.task)
@@ -40,11 +40,11 @@ def check_event(state: LiveState, event: Event) -> None:
 
 
 def check_report(state: LiveState, report: Report) -> None:
-    """Raise `InputError` if an agent cannot report, or not this."""
+    """Raise `InputError` if an agent cannot report at all, or not this."""
     agent = state.agent(report.agent)
     if agent.status in (AgentStatus.ABSENT, AgentStatus.FAILED):
         raise InputError(f"agent {shown(report.agent)} is {agent.status}, and cannot report", "agent")
     if report.task is not None:
         state.task(report.task)
     if report.position is not None and state.distances.has_table:
-        raise InputError("leads nowhere where distances are given by a table; say at which task it is", "position")
+        raise InputError("has no distances, as these are given by a table; say at which task it is", "position")

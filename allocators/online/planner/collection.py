@@ -1,11 +1,11 @@
-"""Garbage is collected after a plan is made, not meanwhile: with many objects that alone takes a tenth of a second."""
+"""Deferral of garbage collection until a plan is made: with many objects, it may take a tenth of a second."""
 
 import gc
 import threading
 
 
 class CollectedLater:
-    """Holds back automatic collections while it is entered, by however many threads at once."""
+    """A reentrant context that disables automatic garbage collection while any thread is inside."""
 
     def __init__(self) -> None:
         self._lock, self._entered, self._was_enabled = threading.Lock(), 0, False
@@ -21,7 +21,7 @@ class CollectedLater:
         with self._lock:
             self._entered -= 1
             if self._entered == 0 and self._was_enabled:
-                gc.enable()  # a collection begins only with the next object that is made
+                gc.enable()  # collection starts only at the next allocation
 
 
 collected_later = CollectedLater()

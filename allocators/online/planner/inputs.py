@@ -1,4 +1,4 @@
-"""What a planner is told: the events of missions, and reports of agents."""
+"""Inputs of a planner: events of missions, and reports of agents."""
 
 import math
 from collections.abc import Mapping
@@ -11,31 +11,31 @@ from alloc.problems.formats.json_columns import Row, require_known
 from alloc.problems.missions.events import FIELDS, LATEST, Event, EventKind
 
 AGENT_REPORTS = "agent-reports"
-"""The kind of input that missions do not have, as it depends on what agents were ordered to do."""
+"""Kind of input that is not an event of missions, as it depends on agents' orders."""
 
 REPORT_FIELDS = ("agent", "position", "task", "battery")
 
 
 @dataclass(frozen=True)
 class Report:
-    """Where an agent is and what its battery holds, as it says itself.
+    """An agent's own report of its place and battery.
 
     Attributes
     ----------
     hour : float
     agent : str
-        Its id.
+        Id of the agent.
     position : tuple of float, or None
-        Two or three coordinates of the place where it is.
+        Two or three coordinates of its place.
     task : str or None
         Id of the task where it is, instead of coordinates.
     battery : float or None
-        Energy that is left.
+        Energy left.
 
     Raises
     ------
     InputError
-        If a value is wrong, or it says nothing.
+        If a value is invalid, or all are None.
     """
 
     hour: float
@@ -57,15 +57,15 @@ class Report:
         if self.battery is not None:
             self._set("battery", float(real(self.battery, "battery", 0, LATEST)))
         if self.position is not None and self.task is not None:
-            raise InputError("says where the agent is, as does position; give one of them", "task")
+            raise InputError("gives the place of the agent, as does position; give one of them", "task")
         if (self.position, self.task, self.battery) == (None, None, None):
-            raise InputError("says nothing; give position or task, battery, or both", "agent")
+            raise InputError("reports nothing; give position or task, battery, or both", "agent")
 
     def _set(self, name: str, value: object) -> None:
         object.__setattr__(self, name, value)
 
     def to_dict(self) -> Row:
-        """Return the report as a line of JSON has it."""
+        """Return the report as in a JSON line."""
         fields: Row = {"hour": self.hour, "event": AGENT_REPORTS}
         for name in REPORT_FIELDS:
             value = getattr(self, name)
@@ -76,13 +76,13 @@ class Report:
 
 @dataclass(frozen=True)
 class Input:
-    """Something that a planner was told.
+    """An input of a planner.
 
     Attributes
     ----------
     said : Event or Report
     whole : dict or None
-        The fields of an agent or a task that comes with its event.
+        The fields of a new agent or task, if its event defines one.
     """
 
     said: Event | Report
@@ -90,18 +90,18 @@ class Input:
 
     @classmethod
     def of(cls, given: object, now: float) -> "Input":
-        """Return what was said by an event, a report, or the fields of one.
+        """Return the input given as an event, a report, or the fields of one.
 
         Parameters
         ----------
         given : Event, Report or mapping
         now : float
-            Hour of what has none.
+            Hour of an input without one.
 
         Raises
         ------
         InputError
-            If it is none of these, a field is unknown or missing, or a value is wrong.
+            If it is none of these, a field is unknown or missing, or a value is invalid.
         """
         if isinstance(given, Event | Report):
             return cls(given)
@@ -134,7 +134,7 @@ class Input:
         return cls(event, dict(whole))
 
     def to_dict(self) -> Row:
-        """Return it as a line of JSON has it."""
+        """Return the input as in a JSON line."""
         fields = self.said.to_dict()
         if self.whole is not None:
             fields["agent" if "agent" in fields else "task"] = self.whole

@@ -1,4 +1,4 @@
-"""A policy that decides in a thread of its own, so that whoever waits for it need not wait longer than it wants."""
+"""Decisions of a policy in a worker thread, so that callers can stop waiting at their deadline."""
 
 import math
 import threading
@@ -16,7 +16,7 @@ from alloc.problems.missions.simulation.state import STAY, AgentStatus, Order
 from alloc.problems.vocabulary import Knowledge
 
 DECISION_SHARE = 0.6
-"""Part of the deadline that a policy is told it has: the rest is for the view before, and the orders after."""
+"""Share of the deadline that is given to the policy; the rest is for the view and the orders."""
 
 
 class Decision:
@@ -29,16 +29,16 @@ class Decision:
     Attributes
     ----------
     until : float
-        When nobody waits for it any more, as `time.perf_counter` says.
+        Value of `time.perf_counter` after which no caller waits for it.
     version, seen : int
-        Of what was known when it began, and how much had been told; -1 before.
+        Version of the state, and number of news, when it began; -1 before.
     orders : dict of str to Order
-        Given so far; one agent after the other where the policy decides for each.
+        Orders so far; they come one by one if the policy decides for each agent.
     done : threading.Event
     is_whole : bool
-        Whether the policy answered for all.
+        Whether the policy has decided for all agents.
     problem : str or None
-        Why it failed.
+        Error of the policy, if it failed.
     """
 
     def __init__(self, until: float) -> None:
@@ -51,17 +51,17 @@ class Decision:
 
     @property
     def is_overdue(self) -> bool:
-        """Whether nobody waits for it any more."""
+        """Whether no caller waits for it any more."""
         return time.perf_counter() > self.until
 
     def is_stale(self, version: int) -> bool:
-        """Return whether it is of no use for who asks now, when this is the version of what is known."""
+        """Return whether a new decision is needed for a caller at this version of the state."""
         is_over = self.is_whole or self.problem is not None
         return self.version not in (-1, version) or (self.is_overdue and not is_over)
 
 
 class Leader:
-    """Lets a policy decide, one decision at a time.
+    """Runs the decisions of a policy in a worker thread, one at a time.
 
     Parameters
     ----------
@@ -70,12 +70,12 @@ class Leader:
     deadline_s : float or None
     state : LiveState
     look : callable
-        Returns the view of what is known, and notes its version in a decision.
+        Returns the present view, and records its version in the decision.
 
     Attributes
     ----------
     last : Decision or None
-        The last one for which the policy answered for all.
+        The last decision that is complete.
     """
 
     def __init__(
@@ -103,14 +103,14 @@ class Leader:
         self._thread.start()
 
     def request(self, version: int, until: float) -> Decision:
-        """Return a decision to be made as soon as those before it are; what it is about is looked at then.
+        """Queue a decision and return it; it will be based on the state at the time when it begins.
 
         Parameters
         ----------
         version : int
-            Of what is known now; a decision about this, or one that has not begun, is requested only once.
+            Version of the state; a queued decision, or one about this version, is shared instead of a new one.
         until : float
-            When it is of no use any more, as `time.perf_counter` says.
+            Value of `time.perf_counter` after which the decision is of no use.
         """
         decision = self._wanted_last
         if decision is None or decision.is_stale(version):
@@ -120,7 +120,7 @@ class Leader:
         return decision
 
     def close(self) -> None:
-        """End the thread once the decision in hand is made."""
+        """End the thread after the decision in progress."""
         self._wanted.put(None)
 
     def _work(self) -> None:
@@ -128,7 +128,7 @@ class Leader:
             try:
                 if not decision.is_overdue:
                     self._decide(self._look(decision), decision)
-            except Exception as error:  # whatever a policy does, the last plan stands
+            except Exception as error:  # whatever a policy does, the last plan stays in force
                 decision.problem = f"{type(error).__name__}: {error}"
             decision.done.set()
             del decision
@@ -137,7 +137,7 @@ class Leader:
         if self._fleet is not None:
             orders = self._fleet.decide(view)
             if not isinstance(orders, Mapping):
-                raise PolicyError(f"it answered {type(orders).__name__}, not orders by agent")
+                raise PolicyError(f"it returned {type(orders).__name__}, not a mapping of orders")
             decision.orders.update({name: _order(order) for name, order in orders.items()})
             self._finish(decision)
             return
@@ -150,7 +150,7 @@ class Leader:
             if order is not None:
                 decision.orders[name] = _order(order)
             if decision.is_overdue and number < len(names):
-                self._broken_off = names[number]  # the next one begins there, so that everybody's turn comes
+                self._broken_off = names[number]  # the next decision begins there, so that all agents get their turn
                 return
         self._finish(decision)
 
@@ -168,7 +168,7 @@ class Leader:
             yield name, order
 
     def _forget_deciders(self, count: int) -> None:
-        """Keep those of agents that are known, where far more have been than there are agents."""
+        """Drop the deciders of forgotten agents once there are far more deciders than agents."""
         if len(self._agents) > 2 * (count + MOST_OVER):
             known = self._state.all_agents
             self._agents = {name: decider for name, decider in self._agents.items() if name in known}
@@ -184,7 +184,7 @@ class Leader:
 
 
 def _ordered(report: AgentReport, order: Order) -> AgentReport:
-    """Return an agent as others know it once it has an order."""
+    """Return the report of an agent after it has got an order."""
     if order.task == report.task:
         return report
     status = AgentStatus.IDLE if order == STAY else AgentStatus.FLYING
@@ -193,7 +193,7 @@ def _ordered(report: AgentReport, order: Order) -> AgentReport:
 
 def _order(order: object) -> Order:
     if not isinstance(order, Order):
-        raise PolicyError(f"it answered {order!r}, which is no Order")
+        raise PolicyError(f"it returned {order!r}, which is not an Order")
     if order.position is not None and not all(math.isfinite(axis) for axis in order.position):
-        raise PolicyError(f"it answered {order!r}, which leads nowhere")
+        raise PolicyError(f"it returned {order!r}, whose position is not finite")
     return order

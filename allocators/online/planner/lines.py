@@ -1,4 +1,4 @@
-"""A planner for programs in any language: each line of JSON that comes in is answered by one."""
+"""A planner for programs in any language: a protocol in which each line of JSON is answered by one line."""
 
 from collections.abc import Callable
 
@@ -17,20 +17,20 @@ from alloc.problems.missions.mission import Mission
 REQUEST_FORMAT, ORDERS_FORMAT = "alloc-planner-request/1", "alloc-planner-orders/1"
 
 REQUESTS = {"plan": ("hour",), "pin": ("agent", "task"), "unpin": ("agent",), "save": ()}
-"""Fields of each request that is no event."""
+"""Fields of each kind of request other than events."""
 
 
 class Lines:
-    """Answers lines, whatever they are; an error is an answer, too, and changes nothing.
+    """Answers any line; for an invalid one, the answer is an error, and nothing changes.
 
     Parameters
     ----------
     planner : MissionPlanner or None
-        None where the first line that is no error is to be the mission.
+        None if the first valid line is to be the mission.
     begin : callable
         Returns the planner of a mission.
     state : str or None
-        The file to which it is saved.
+        File to which the planner is saved.
     """
 
     def __init__(
@@ -39,13 +39,13 @@ class Lines:
         self._planner, self._begin, self._state = planner, begin, state
 
     def answer(self, line: str, number: int) -> Row:
-        """Return the answer to a line: the whole plan, and what is new in it; or an error.
+        """Return the answer to a line: the whole plan and its changes, or an error.
 
         Parameters
         ----------
         line : str
         number : int
-            Of the line, from 1.
+            Line number, from 1.
         """
         try:
             plan, error = self._do(require_object(parse(line))), None
@@ -66,17 +66,17 @@ class Lines:
         }
 
     def save(self) -> None:
-        """Save the planner, if there is one and a file for it."""
+        """Save the planner, if there are a planner and a file."""
         if self._planner is not None and self._state is not None:
             self._planner.save(self._state)
 
     def close(self) -> None:
-        """End the planner."""
+        """Close the planner."""
         if self._planner is not None:
             self._planner.close()
 
     def _do(self, row: Row) -> Plan | None:
-        """Return the plan after a line, None where none is asked for."""
+        """Process a line and return the plan, or None if none is requested."""
         if self._planner is None:
             self._planner = self._begin(mission_from_document(row))
             return self._planner.plan()
@@ -94,7 +94,7 @@ class Lines:
         return self._planner.plan(hour) if wanted else None
 
     def _request(self, planner: MissionPlanner, fields: Row) -> float | None:
-        """Do what is asked for, and return the hour of the plan to be made."""
+        """Process a request, and return the hour of the plan to be made."""
         name = text(fields.pop("request"), "request")
         if name not in REQUESTS:
             raise InputError(f"there is no request {shown(name)}{nearest(name, tuple(REQUESTS))}", "request")

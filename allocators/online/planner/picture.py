@@ -1,4 +1,4 @@
-"""What a planner believes to be so now: what it was told, and since then that orders are followed."""
+"""A planner's estimate of the present state, from its inputs and the assumption that orders are followed."""
 
 import math
 from dataclasses import dataclass, replace
@@ -37,25 +37,25 @@ WORDS = {
 
 
 MOST_ENTRIES = 4
-"""On the agenda, for each agent and task: at most two of them are not void."""
+"""Number of agenda entries per agent and task after which the agenda is rebuilt; at most two of them are not void."""
 
 
 MOST_NEWS = 1000
-"""Of what happened since the last plan, so much is kept at least."""
+"""Smallest number of news since the last plan that are kept."""
 
 
 @dataclass(frozen=True)
 class News:
-    """Something by which a plan may change.
+    """A piece of news that may change a plan.
 
     Attributes
     ----------
     hour : float
     text : str
     agent, task : str or None
-        Whom or what it is about.
+        Ids of the agent and the task concerned.
     is_minor : bool
-        Whether it is one of the reports that come all the time: where an agent is, or what is left of a task.
+        Whether it is a routine report of an agent's place or of a task's work left.
     """
 
     hour: float
@@ -66,23 +66,24 @@ class News:
 
 
 class Picture:
-    """Agents and tasks as they are believed to be.
+    """The estimated present state of agents and tasks.
 
-    Agents are taken to follow their orders and work to go on as in the simulation of missions, until an event or a
-    report says otherwise. A task is done when by that its work is; if work is then reported, it is open again.
+    Agents are assumed to follow their orders, and work to proceed as in the simulation of missions, until an event or a
+    report says otherwise. A task is assumed to be done when its work should be; if work is reported afterwards, it is
+    open again.
 
     Parameters
     ----------
     mission : Mission
-        What is there at hour 0 counts; what it says of later hours has to be told when it happens.
+        Only its state at hour 0 is used; later events have to be submitted when they happen.
 
     Attributes
     ----------
     state : LiveState
     news : list of News
-        What happened, in the order of time, until it is forgotten.
+        News in chronological order, until they are forgotten.
     told : int
-        How much was ever told.
+        Total number of news so far, including forgotten ones.
     """
 
     def __init__(self, mission: Mission) -> None:
@@ -98,7 +99,7 @@ class Picture:
         self._tell("the mission began")
 
     def advance(self, hour: float) -> None:
-        """Let time pass: flights end, work gets done, deadlines pass."""
+        """Advance to an hour: flights end, work gets done, deadlines pass."""
         state = self.state
         while self.agenda.hour <= hour:
             state.hour = max(state.hour, self.agenda.hour)
@@ -107,7 +108,7 @@ class Picture:
         state.hour = hour
 
     def take(self, given: Input) -> None:
-        """Take notice of what was said, at its hour; if it cannot be so, that is an error and nothing changes."""
+        """Apply an input at its hour; an inconsistent one is an error and changes nothing."""
         said = given.said
         check_hour(self.state, said.hour)
         if given.whole is not None:
@@ -134,7 +135,7 @@ class Picture:
         self._changes.balance()
 
     def order(self, name: str, order: Order) -> str | None:
-        """Give an agent an order; return why it is not given, None if it is. `look_ahead` comes after the last."""
+        """Give an agent an order; return why it is refused, None if it is not. Call `look_ahead` after the last one."""
         agent = self.state.agent(name)
         if order == agent.order:
             return None
@@ -152,10 +153,10 @@ class Picture:
         return problem
 
     def look_ahead(self) -> None:
-        """Find out, after some orders, when flights and work will end."""
+        """Schedule arrivals and completions after new orders."""
         self._changes.balance()
         if len(self.agenda) > MOST_ENTRIES * (len(self.state.agents) + len(self.state.tasks)):
-            self.agenda = Agenda()  # without all that is void, as agents were diverted
+            self.agenda = Agenda()  # drops void entries of diverted agents
             self._changes = Changes(self.state, self.agenda)
             self.restore_agenda()
 
@@ -164,12 +165,12 @@ class Picture:
         return [agent for agent in self.state.agents if agent.status in ACTIVE]
 
     def view(self, pins: dict[str, str | None]) -> View:
-        """Return what is so now: agents in the mission, open tasks, and those to which an agent is under way.
+        """Return the present view: agents in the mission, open tasks, and tasks to which an agent is under way.
 
         Parameters
         ----------
         pins : dict
-            Agents that may do one task alone, or none.
+            Agents that may do only one task, or none.
         """
         agents: dict[str, AgentReport] = {}
         for agent in self.active():
@@ -200,7 +201,7 @@ class Picture:
         return refusal(self.state.distances, report.facts, report.place, report.battery, goal.facts.place, goal.facts)
 
     def restore_agenda(self) -> None:
-        """Put on an empty agenda what is to come by the state."""
+        """Fill an empty agenda with the arrivals, completions and deadlines of the present state."""
         for agent in self.state.agents:
             if agent.flight is not None:
                 self.agenda.push(agent.flight.arrives, Turn.ARRIVAL, Arrival(agent, agent.flight))
@@ -212,14 +213,14 @@ class Picture:
                     self.agenda.push(max(hour, self.state.hour), Turn.COMPLETION, Completion(task, task.version))
 
     def tell(self, news: News) -> None:
-        """Add to the news."""
+        """Add a piece of news."""
         self.news.append(news)
         self.told += 1
         if len(self.news) > 2 * MOST_NEWS:
-            del self.news[:-MOST_NEWS]  # nobody has planned for long, or a policy fails
+            del self.news[:-MOST_NEWS]  # no plan was made for long, or the policy fails
 
     def forget(self, count: int) -> None:
-        """Forget the first of all that was ever told, as many as `count`."""
+        """Forget the first `count` of all news so far."""
         del self.news[: max(0, len(self.news) - (self.told - count))]
 
     def _tell(self, text: str, agent: str | None = None, task: str | None = None) -> None:
@@ -250,14 +251,14 @@ class Picture:
         for agent in workers:
             self._changes.note_agent(agent)
         if task.status is TaskStatus.OPEN and task.facts.deadline <= state.hour:
-            self._close(task, status_at_deadline(state, task))  # work that was not done in time, after all
+            self._close(task, status_at_deadline(state, task))  # the work was not done in time
 
     def _note_deadline(self, task: TaskState) -> None:
         if task.status in (TaskStatus.TO_COME, TaskStatus.OPEN) and task.facts.deadline < math.inf:
             self.agenda.push(task.facts.deadline, Turn.DEADLINE, task)
 
     def _take(self, item: object) -> None:
-        """Let one entry of the agenda happen, unless it is void by now."""
+        """Process an entry of the agenda, unless it is void by now."""
         if isinstance(item, Arrival):
             if item.agent.flight is item.flight:
                 land(self.state, item.agent)

@@ -1,4 +1,4 @@
-"""Agents that somebody has pinned to a task: no policy sends them elsewhere."""
+"""Agents that the user has pinned to a task: no policy sends them elsewhere."""
 
 from alloc.allocators.online.planner.picture import News, Picture
 from alloc.problems.arguments import shown, text
@@ -12,12 +12,12 @@ class Pins:
     Parameters
     ----------
     picture : Picture
-        What is believed; it is told of each change.
+        The estimated state; changes of pins are added to its news.
 
     Attributes
     ----------
     tasks : dict of str to str or None
-        Ids of tasks by those of agents; None to stay.
+        Task ids by agent id; None to stay.
     """
 
     def __init__(self, picture: Picture) -> None:
@@ -25,7 +25,7 @@ class Pins:
         self.tasks: dict[str, str | None] = {}
 
     def add(self, agent: str, task: str | None) -> None:
-        """Pin an agent, which can be so as things are; else that is an `InputError`."""
+        """Pin an agent; raise `InputError` if it cannot take the task now."""
         status = self._picture.state.agent(text(agent, "agent")).status
         if task is not None:
             problem = self._picture.refusal(agent, text(task, "task"))
@@ -37,14 +37,14 @@ class Pins:
         self._picture.tell(News(self._picture.state.hour, "was pinned", agent))
 
     def remove(self, agent: str) -> None:
-        """Let the policy lead an agent again; one that is not pinned is an `InputError`."""
+        """Unpin an agent; raise `InputError` if it is not pinned."""
         if text(agent, "agent") not in self.tasks:
             raise InputError(f"{shown(agent)} is not pinned", "agent")
         del self.tasks[agent]
         self._picture.tell(News(self._picture.state.hour, "was unpinned", agent))
 
     def lapse(self) -> None:
-        """Forget the pins of tasks that are over, and of agents that have failed."""
+        """Remove the pins of closed tasks and of failed agents."""
         if not self.tasks:
             return
         state = self._picture.state
@@ -53,7 +53,7 @@ class Pins:
         self.tasks = {agent: task for agent, task in self.tasks.items() if agent in there and task in tasks}
 
     def order(self, agent: str) -> Order | None:
-        """Return the order of an agent by its pin; None if it is not pinned."""
+        """Return the order of a pinned agent; None if it is not pinned."""
         if agent not in self.tasks:
             return None
         task = self.tasks[agent]

@@ -1,4 +1,4 @@
-"""A plan: the order of each agent, how it differs from the one before, and what caused that."""
+"""Plans: the order of each agent, its changes from the previous plan, and their causes."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -8,20 +8,20 @@ from alloc.allocators.online.planner.picture import News
 from alloc.problems.missions.simulation.state import Order
 
 MOST_CAUSES = 3
-"""Causes that are named of a change for which none is nearer than the others."""
+"""Number of causes that are listed for a change without a specific cause."""
 
 
 @dataclass(frozen=True)
 class OrderChange:
-    """An order that differs from the plan before.
+    """An order that differs from the previous plan.
 
     Attributes
     ----------
     agent : str
     before, after : Order or None
-        None where the agent takes no orders.
+        None if the agent takes no orders.
     cause : str
-        What happened since: to the agent, to one of the two tasks, or else in the mission.
+        What happened since: to the agent, to one of the two tasks, or otherwise in the mission.
     """
 
     agent: str
@@ -32,16 +32,16 @@ class OrderChange:
 
 @dataclass(frozen=True)
 class Plan(Mapping[str, Order]):
-    """Orders by the ids of all agents that take some.
+    """Orders of all agents that take orders, by agent id.
 
     Attributes
     ----------
     hour : float
     orders : mapping of str to Order
     is_new : bool
-        Whether the policy answered in time; else these are the last orders, less those that cannot be followed now.
+        Whether the policy answered in time; otherwise these are the last orders that can still be followed.
     problem : str or None
-        Why the policy gave no answer, if it failed.
+        Error of the policy, if it failed.
     changes : tuple of OrderChange
     """
 
@@ -64,7 +64,7 @@ class Plan(Mapping[str, Order]):
 def changes_of(
     before: Mapping[str, Order], after: Mapping[str, Order], news: Sequence[News]
 ) -> tuple[OrderChange, ...]:
-    """Return each order that differs, with its cause among the news since the plan before."""
+    """Return the orders that differ, each with its cause among the news since the previous plan."""
     names = dict.fromkeys((*before, *after))
     changed = [name for name in names if before.get(name) != after.get(name)]
     if not changed:
@@ -86,7 +86,7 @@ def changes_of(
 def _cause(
     name: str, before: Mapping[str, Order], after: Mapping[str, Order], about: Mapping[tuple[str, str], list[News]]
 ) -> str:
-    """Return what happened to an agent, or to the tasks that it had and has; nothing where that is none."""
+    """Return what happened to an agent and to its previous and new task; empty if nothing did."""
     orders = (before.get(name), after.get(name))
     tasks = [order.task for order in orders if order is not None and order.task is not None]
     return "; ".join(
@@ -95,13 +95,13 @@ def _cause(
 
 
 def _told(news: Sequence[News]) -> list[str]:
-    """Return news as words, what agents report all the time only where there is nothing else."""
+    """Return news as text; routine reports only if there is nothing else."""
     major = [one for one in news if not one.is_minor]
     return list(dict.fromkeys(map(told, major or news)))
 
 
 def told(news: News) -> str:
-    """Return news as words."""
+    """Return a piece of news as text."""
     subjects = (("agent", news.agent), ("task", news.task))
     subject = "".join(f"{kind} {name} " for kind, name in subjects if name is not None)
     return f"{subject}{news.text} at {news.hour:g}"

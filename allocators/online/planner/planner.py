@@ -26,32 +26,32 @@ from alloc.problems.missions.simulation.reports import View
 from alloc.problems.missions.simulation.state import STAY, Order, TaskStatus
 
 RESERVE_MS, RESERVE_SHARE = 5.0, 0.3
-"""Kept of the deadline, beside what it took before to wake up and follow orders; and the most, as a part of it."""
+"""Reserve of the deadline, beside the time that waking up and giving orders took before, and its largest share."""
 
 
 class MissionPlanner(AbstractContextManager["MissionPlanner"]):
-    """Plans for agents and tasks that it is told of, and answers before a deadline.
+    """Plans for the agents and tasks of a running mission, and answers before a deadline.
 
-    It knows what is there at hour 0 of a mission. All that comes later has to be submitted as it happens. Between two
-    events agents are taken to follow their orders, until they report something else. All methods may be called from
-    any thread; a plan is made in a thread of its own.
+    It knows the state of the mission at hour 0; later events have to be submitted as they happen. In between, agents
+    are assumed to follow their orders until they report something else. All methods may be called from any thread;
+    plans are made in a separate thread.
 
     Parameters
     ----------
     mission : Mission or Instance
     policy : str or Policy
-        A name, or a policy with its own parameters. Everything is known here, so that any policy will do.
+        A name, or a policy with its own parameters. Any policy can be used, as the planner has full knowledge.
     deadline_ms : float or None
-        Milliseconds within which `plan` answers; None to wait for the policy.
+        Milliseconds within which `plan` returns; None to wait for the policy.
     seed : int
-        Of the policy.
+        Seed of the policy.
     **settings
         Single parameters of a policy that is given by name.
 
     Raises
     ------
     InputError
-        If the policy or a parameter is unknown, or an argument is wrong.
+        If the policy or a parameter is unknown, or an argument is invalid.
     """
 
     def __init__(
@@ -66,7 +66,7 @@ class MissionPlanner(AbstractContextManager["MissionPlanner"]):
         of_type(mission, (Mission, Instance), "mission")
         of_type(policy, (str, Policy), "policy")
         if isinstance(policy, Policy) and settings:
-            raise InputError("is an object with its own parameters; set them where it is made", "policy")
+            raise InputError("is an object with its own parameters; set them when you create it", "policy")
         self._deadline_s = None if deadline_ms is None else real(deadline_ms, "deadline_ms", above=True) / 1000
         self._seed = whole(seed, "seed", 0, 2**63 - 1)
         self._made_of = (policy if isinstance(policy, str) else None, settings)
@@ -82,28 +82,28 @@ class MissionPlanner(AbstractContextManager["MissionPlanner"]):
         self.close()
 
     def close(self) -> None:
-        """End the planner's thread; it cannot plan any more."""
+        """End the planner's thread; no further plans can be made."""
         self._is_closed = True
         self._leader.close()
 
     @property
     def hour(self) -> float:
-        """Up to which hour it knows what happened."""
+        """Hour up to which events are known."""
         return self._picture.state.hour
 
     def submit(self, event: Event | Report | Mapping[str, object]) -> None:
-        """Take notice of an event of the mission, or of a report of an agent.
+        """Submit an event of the mission, or a report of an agent.
 
         Parameters
         ----------
         event : Event, Report or mapping
-            Or its fields as in a file; without an hour it is now. ``task-changes`` says what work is left, and
-            ``agent-reports`` where an agent is and what its battery holds.
+            An event or a report, or its fields as in a file; the hour defaults to `hour`. ``task-changes`` gives the
+            work left of a task, ``agent-reports`` an agent's place and battery.
 
         Raises
         ------
         InputError
-            If a field is wrong, it was submitted before, or it cannot happen as things are. Then nothing has changed.
+            If a field is invalid, it was submitted before, or it cannot happen in the present state; nothing changes.
         """
         with self._lock:
             given = Input.of(event, self.hour)
@@ -118,51 +118,51 @@ class MissionPlanner(AbstractContextManager["MissionPlanner"]):
             self._version += 1
 
     def pin(self, agent: str, task: str | None) -> None:
-        """Let an agent do this task until it is over, whatever the policy says, or None to stay where it is.
+        """Keep an agent at a task until that is closed, whatever the policy decides; with None, where it is.
 
         Parameters
         ----------
         agent, task : str
-            Their ids.
+            Ids.
 
         Raises
         ------
         InputError
-            If one is unknown, or the agent cannot take the task now.
+            If an id is unknown, or the agent cannot take the task now.
         """
         with self._lock:
             self._pins.add(agent, task)
             self._version += 1
 
     def unpin(self, agent: str) -> None:
-        """Let the policy lead an agent again.
+        """Let the policy decide for an agent again.
 
         Parameters
         ----------
         agent : str
-            Its id; where it is not pinned that is an `InputError`.
+            Its id; `InputError` if it is not pinned.
         """
         with self._lock:
             self._pins.remove(agent)
             self._version += 1
 
     def plan(self, hour: float | None = None) -> Plan:
-        """Return the orders of all agents, by the policy if it answers in time.
+        """Return the orders of all agents, new ones if the policy answers in time.
 
         Parameters
         ----------
         hour : float, optional
-            What time it is; that of the last event by default.
+            The present hour; by default that of the last event.
 
         Returns
         -------
         Plan
-            Orders that can be followed. Where nothing has happened it is the last one.
+            Orders that can be followed; the last plan if nothing has happened.
 
         Raises
         ------
         InputError
-            If the hour has passed, or the planner is closed.
+            If the hour is in the past, or the planner is closed.
         """
         with nullcontext() if self._deadline_s is None else collected_later:
             return self._plan_until(self._until(), hour)
@@ -185,16 +185,16 @@ class MissionPlanner(AbstractContextManager["MissionPlanner"]):
         return plan
 
     def why_changed(self) -> tuple[OrderChange, ...]:
-        """Return each order of the last plan that differs from the one before, and what caused it."""
+        """Return the orders of the last plan that differ from the previous one, with their causes."""
         return self._plan.changes
 
     def save(self, path: PathLike) -> None:
-        """Write all that it knows, its pins and its plan to a file, from which `restore` goes on.
+        """Save the planner's knowledge, pins and plan to a file, for `restore`.
 
         Parameters
         ----------
         path : str or path
-            Where nothing can be written that is an `InputError`.
+            `InputError` if it cannot be written.
         """
         with self._lock:
             name, settings = self._made_of
@@ -212,20 +212,20 @@ class MissionPlanner(AbstractContextManager["MissionPlanner"]):
 
     @classmethod
     def restore(cls, path: PathLike, policy: Policy | None = None) -> "MissionPlanner":
-        """Return the planner that was saved: it has the same plan, and goes on from there.
+        """Return a planner in the saved state, with the same plan.
 
-        What a policy remembers of its own begins anew.
+        The policy's own memory is not part of it.
 
         Parameters
         ----------
         path : str or path
         policy : Policy, optional
-            The policy, where it was an object when the planner was saved.
+            The policy, if the saved planner was created with an object.
 
         Raises
         ------
         InputError
-            If the file cannot be read, or is none of `save`.
+            If the file cannot be read, or was not written by `save`.
         """
         document = saved.read(path)
         with saved.told_of(path):
@@ -259,16 +259,16 @@ class MissionPlanner(AbstractContextManager["MissionPlanner"]):
             return self._picture.view(self._pins.tasks)
 
     def _until(self) -> float:
-        """Return when to wait no more, as `time.perf_counter` says, so that orders are given in time."""
+        """Return the value of `time.perf_counter` up to which to wait, so that orders are given in time."""
         if self._deadline_s is None:
             return math.inf
         reserve = min(RESERVE_SHARE * self._deadline_s, RESERVE_MS / 1000 + 1.5 * self._last_s)
         return time.perf_counter() + self._deadline_s - reserve
 
     def _conclude(self, decision: Decision) -> Plan:
-        """Make the next plan of what was decided; of the last one where that is nothing."""
+        """Make the next plan from a decision and, for agents without a new order, from the last plan."""
         if decision.is_whole and decision.version <= self._planned:
-            return self._plan  # another thread was here with the same
+            return self._plan  # another thread has already applied this decision
         self._follow(dict(decision.orders))
         picture, before = self._picture, self._plan
         orders = {agent.facts.id: agent.order for agent in picture.active()}
@@ -280,14 +280,14 @@ class MissionPlanner(AbstractContextManager["MissionPlanner"]):
         return self._plan
 
     def _follow_late(self) -> None:
-        """Give orders that came after the deadline of the last plan, of what was known then."""
+        """Give orders of a decision that ended after the deadline of the last plan."""
         late = self._leader.last
         if late is not None and self._planned < late.version < self._version:
             self._follow(late.orders)
             self._leader.last = None
 
     def _follow(self, orders: Mapping[str, Order]) -> None:
-        """Give the orders that can be followed now, those of pins before all, and end those that lead nowhere."""
+        """Give the orders that can be followed now, with precedence of pins, and end orders for closed tasks."""
         picture = self._picture
         self._pins.lapse()
         for agent in picture.active():

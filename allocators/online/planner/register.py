@@ -1,4 +1,4 @@
-"""Agents or tasks by their ids, of which not all that ever were are kept."""
+"""A register of agents or tasks by id, with a bounded history of closed ones."""
 
 from bisect import bisect_left
 from collections.abc import Collection, Iterable, Iterator
@@ -9,27 +9,27 @@ from alloc.problems.errors import InputError, nearest
 from alloc.problems.missions.simulation.state import AgentState, TaskState
 
 MOST_OVER = 200
-"""How many are kept at least of those that are over, the last ones; twice as many at most."""
+"""Number of the last closed entries that are kept at least; at most twice as many are."""
 
 One = TypeVar("One", AgentState, TaskState)
 
 
 class Register(Generic[One]):
-    """Those that are not over, in the order in which they came, and the last of those that are.
+    """All agents or tasks that are not closed (failed, for agents), by index, and the last closed ones.
 
     Parameters
     ----------
     kind : str
-        What they are called in errors.
+        Name of an entry in error messages.
     all_there : list
-        With which it begins.
+        Initial entries.
 
     Attributes
     ----------
     lasting : list
-        Those that are not over, by their index.
+        Entries that are not closed, by index.
     ever : int
-        How many there were in all, which is the index of the next one.
+        Total number of entries so far, which is the index of the next one.
     """
 
     def __init__(self, kind: str, all_there: list[One]) -> None:
@@ -44,16 +44,16 @@ class Register(Generic[One]):
         return len(self._by_id)
 
     def __iter__(self) -> Iterator[One]:
-        """All that are known, by their index."""
+        """Iterate over all known entries by index."""
         return iter(sorted(self._by_id.values(), key=_index))
 
     @property
     def is_full(self) -> bool:
-        """Whether more are over than are kept."""
+        """Whether there are more closed entries than are kept."""
         return len(self._over) > 2 * MOST_OVER
 
     def find(self, name: str | None) -> One:
-        """Return one by its id; an unknown id is an `InputError`."""
+        """Return an entry by its id; raise `InputError` if it is unknown."""
         one = self._by_id.get(str(name))
         if one is None:
             raise InputError(
@@ -67,13 +67,13 @@ class Register(Generic[One]):
             raise InputError(f"there is {self._kind} {shown(name)} already", f"{self._kind}.id")
 
     def add(self, one: One) -> None:
-        """Add one that came last of all."""
+        """Add a new entry."""
         self.lasting.append(one)
         self._by_id[one.facts.id] = one
         self.ever = one.index + 1
 
     def file(self, one: One, *, is_over: bool) -> None:
-        """Keep one that is known among those that are over, or among the others."""
+        """Move a known entry to the closed ones, or to the others."""
         place = bisect_left(self.lasting, one.index, key=_index)
         is_there = place < len(self.lasting) and self.lasting[place] is one
         if is_over and is_there:
@@ -84,17 +84,17 @@ class Register(Generic[One]):
             del self._over[one.facts.id]
 
     def forget(self, needed: Collection[str | None] = ()) -> None:
-        """Forget those that were over first, where more are over than are kept, but for those that are needed."""
+        """Forget the closed entries beyond the limit, oldest first, except needed ones."""
         for name in [*self._over][: max(0, len(self._over) - MOST_OVER)] if self.is_full else ():
             if name not in needed:
                 del self._over[name], self._by_id[name]
 
     def restore(self, names: Collection[str], later: Iterable[One], ever: int) -> None:
-        """Know these alone, as when a planner was saved: of those that were there, and of those that came later."""
+        """Restrict the register to the saved names, taken from the initial entries and from `later` ones."""
         known = dict.fromkeys(names)
         self._by_id = {one.facts.id: one for one in (*self, *later) if one.facts.id in known}
         if len(self._by_id) < len(known):
-            raise ValueError(f"some {self._kind} is not there")
+            raise ValueError(f"a saved {self._kind} is missing")
         self.lasting[:] = self._by_id.values()
         self._over.clear()
         self.ever = ever

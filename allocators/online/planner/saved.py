@@ -1,4 +1,4 @@
-"""A planner as a file: alloc-planner/1."""
+"""File format of saved planners (alloc-planner/1)."""
 
 import json
 import math
@@ -36,7 +36,7 @@ TASK_LEDGERS = ("left", "since", "appeared", "grown", "done", "cancelled", "miss
 
 
 def document_of(picture: Picture, plan: Plan) -> Row:
-    """Return what is believed, and the plan, as plain objects."""
+    """Return the estimated state and the plan as plain objects."""
     state = picture.state
     return {
         "hour": state.hour,
@@ -73,32 +73,32 @@ def change_to_row(change: OrderChange) -> Row:
 
 
 def write(document: Row, path: PathLike) -> None:
-    """Write a saved planner whole or not at all."""
+    """Write a saved planner atomically."""
     write_text_atomically(path, encode({"format": PLANNER_FORMAT, **document}) + "\n")
 
 
 def read(path: PathLike) -> Row:
-    """Return the document in a file, if it is one of a planner."""
+    """Return the document of a planner in a file; raise `InputError` if it is not one."""
     source = named(path)
     try:
-        document = require_object(json.loads(read_text(path)))  # whole numbers stay whole: they may be settings
+        document = require_object(json.loads(read_text(path)))  # keep integers: they may be parameters
         require_format(document.get("format"), (PLANNER_FORMAT,))
     except InputError as error:
         raise told(error, source) from error.__cause__
     except (ValueError, RecursionError) as error:
-        raise InputError(f"is no JSON: {error}", source=source) from error
+        raise InputError(f"is not JSON: {error}", source=source) from error
     return document
 
 
 @contextmanager
 def told_of(path: PathLike) -> Iterator[None]:
-    """Tell of any fault of a document in which file it is."""
+    """Add the name of the file to errors in its document."""
     try:
         yield
     except InputError as error:
         raise told(error, named(path)) from error.__cause__
     except (KeyError, IndexError, TypeError, ValueError, AttributeError) as error:
-        raise InputError(f"is damaged, or was changed by hand: {error!r}", source=named(path)) from error
+        raise InputError(f"is damaged or was edited: {error!r}", source=named(path)) from error
 
 
 def mission_of(document: Row) -> Mission:
@@ -107,7 +107,7 @@ def mission_of(document: Row) -> Mission:
 
 
 def restored(document: Row, picture: Picture) -> Plan:
-    """Put what was saved into the picture of a new planner of the same mission, and return the plan."""
+    """Restore the saved state in the picture of a new planner of the same mission, and return the plan."""
     state, hour = picture.state, document["hour"]
     rows = _rows(document["agents"]), _rows(document["tasks"])
     ever, forgotten = require_object(document["ever"]), require_object(document["forgotten"])
@@ -184,7 +184,7 @@ def _task(task: TaskState, begun_with: int) -> Row:
 
 
 def _came(one: AgentState | TaskState, begun_with: int) -> Row:
-    """Return what the mission does not say: all of an agent or a task that came later."""
+    """Return the facts of an agent or a task that is not part of the mission, as it came later."""
     if one.index < begun_with:
         return {}
     facts = {field.name: _plain(getattr(one.facts, field.name)) for field in fields(one.facts)}
@@ -237,13 +237,13 @@ def _finite(value: float) -> float | None:
 
 
 def _later(rows: list[Row]) -> list[Row]:
-    """Return the rows of those that came after the mission began."""
+    """Return the rows of agents or tasks that came after the start of the mission."""
     return [row for row in rows if "facts" in row]
 
 
 def _rows(value: object) -> list[Row]:
     if not isinstance(value, list):
-        raise TypeError(f"{value!r} is no list")
+        raise TypeError(f"{value!r} is not a list")
     return value
 
 

@@ -1,4 +1,4 @@
-"""Agents and tasks of a mission that has no end yet: more of both may come than it began with."""
+"""The state of an open-ended mission, to which agents and tasks may be added."""
 
 from dataclasses import replace
 
@@ -33,7 +33,7 @@ class LiveState(MissionState):
     tasks : list of TaskState
         Those that are open or to come.
     all_agents, all_tasks : Register
-        These, and the last of those that have failed or are over.
+        These, and the last ones that have failed or are closed.
     """
 
     def __init__(self, mission: Mission) -> None:
@@ -52,14 +52,14 @@ class LiveState(MissionState):
         return self.all_tasks.find(name)
 
     def file_agent(self, agent: AgentState) -> None:
-        """Keep an agent among those that may still take orders, unless it has failed."""
+        """Update the register after a change of an agent's status."""
         self.all_agents.file(agent, is_over=agent.status is AgentStatus.FAILED)
         self.all_agents.forget()
 
     def file_task(self, task: TaskState) -> None:
-        """Keep a task among those to be done or among those that are over, as it is now.
+        """Update the register after a change of a task's status.
 
-        A task that is over is not forgotten while an agent is on its way there.
+        A closed task is not forgotten while an agent is on its way there.
         """
         self.all_tasks.file(task, is_over=task.status not in TO_DO)
         if self.all_tasks.is_full:
@@ -69,17 +69,17 @@ class LiveState(MissionState):
             self.all_tasks.forget(goals)
 
     def admit(self, event: Row) -> None:
-        """Add the agent or the task that comes with an event, as one that is still to come.
+        """Add the agent or the task defined in an event, as one that is still to come.
 
         Parameters
         ----------
         event : dict
-            As in a file of a mission.
+            As in a mission file.
 
         Raises
         ------
         InputError
-            If its id is taken, or a field breaks the rules of the format; then nothing is added.
+            If its id is taken, or a field breaks the rules of the format. Nothing is added then.
         """
         kind = "agent" if event["event"] == EventKind.AGENT_JOINS else "task"
         row = event[kind]
@@ -93,7 +93,7 @@ class LiveState(MissionState):
             self._add_task(new.tasks[-1])
 
     def _alone(self, event: Row, kind: str, row: Row) -> Mission:
-        """Return a mission of what is new, beside what it names and what a mission needs."""
+        """Return a minimal valid mission with the new agent or task, and everything that it refers to."""
         other = {"id": f"other than {row['id']}", "position": row.get("position")}
         agents: list[Row] = []
         tasks: list[Row] = []

@@ -1,4 +1,4 @@
-"""What a report of an agent changes in what a planner believes of it."""
+"""Correction of a planner's state by reports of agents."""
 
 from alloc.allocators.online.planner.inputs import Report
 from alloc.problems.missions.simulation.changes import go, goal_of
@@ -8,19 +8,19 @@ from alloc.problems.missions.simulation.state import ACTIVE, STAY, AgentState, M
 
 
 def correct(state: MissionState, agent: AgentState, report: Report) -> str | None:
-    """Put an agent where it is, with the battery that it has, and let it go on by its order.
+    """Set an agent's place and battery as reported, and let it continue its order.
 
     Parameters
     ----------
     state : MissionState
     agent : AgentState
     report : Report
-        One that can be so.
+        A consistent report.
 
     Returns
     -------
     str or None
-        Why it cannot go on, and has no order now; None if it can.
+        Why it cannot continue, so that it has no order now; None if it can.
     """
     place = _place(state, report)
     if place is None and agent.flight is not None and state.distances.has_table:
@@ -57,7 +57,7 @@ def _place(state: MissionState, report: Report) -> Place | None:
 
 
 def _recharge_on_the_way(state: MissionState, agent: AgentState, battery: float | None) -> None:
-    """Set what the battery holds now on a way that cannot be left, at least so much that the agent comes to its end."""
+    """Set the battery in a flight that cannot be diverted, to at least the energy needed to complete it."""
     assert agent.flight is not None
     assert battery is not None
     needed = agent.facts.energy_per_distance * agent.flight.distance

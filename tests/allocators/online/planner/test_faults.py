@@ -1,4 +1,4 @@
-"""What is wrong is one clear error and changes nothing; a planner that was killed goes on with the same plan."""
+"""Invalid input is one clear error and changes nothing; a killed planner can be restored with the same plan."""
 
 import asyncio
 import json
@@ -17,7 +17,7 @@ FAIL = {"hour": 2.0, "event": "agent-fails", "agent": "ann"}
 
 WRONG = (
     (FAIL, "event: was submitted before, at the same hour"),
-    ({**FAIL, "hour": 1.0}, "hour: is 1, but it is hour 2 already; events come in order"),
+    ({**FAIL, "hour": 1.0}, "hour: is 1, but it is already hour 2; events come in order"),
     ({**FAIL, "hour": 3.0}, "event: agent-fails needs agent 'ann' to be away or in the mission, but it is failed"),
     ({**FAIL, "agent": "bem"}, "agent: there is no agent 'bem' (did you mean 'ben'?)"),
     ({**FAIL, "hour": math.nan}, "hour: must be a finite number"),
@@ -35,27 +35,30 @@ WRONG = (
     ({"event": "task-appears", "task": {"id": "t3", "work": 1}}, "unknown field 'work'"),
     ({"event": "task-appears", "task": {"workload": 1}}, "task.id: must be a non-empty string"),
     ({"event": "agent-joins", "agent": {"id": "cat", "ability": 1, "tasks": ["t7"]}}, "t7"),
-    ({"event": "agent-reports", "agent": "ben"}, "says nothing; give position or task, battery, or both"),
+    ({"event": "agent-reports", "agent": "ben"}, "reports nothing; give position or task, battery, or both"),
     ({"event": "agent-reports", "battery": 1}, "agent: is missing"),
     ({"event": "agent-reports", "agent": "ann", "battery": 1}, "agent 'ann' is failed, and cannot report"),
     ({"event": "agent-reports", "agent": "ben", "position": [0, math.nan]}, "position: must be finite numbers"),
     ({"event": "agent-reports", "agent": "ben", "position": "here"}, "position: must be a list"),
     ({"event": "agent-reports", "agent": "ben", "task": "t9"}, "task: there is no task 't9'"),
-    ({"event": "agent-reports", "agent": "ben", "position": [0, 0], "task": "t1"}, "task: says where the agent is"),
+    (
+        {"event": "agent-reports", "agent": "ben", "position": [0, 0], "task": "t1"},
+        "task: gives the place of the agent",
+    ),
     ("agent-fails", "event: must be"),
 )
 
 
 @pytest.fixture
 def planner(pair):
-    """One in which ann has failed at hour 2."""
+    """Return a planner in which ann has failed at hour 2."""
     with MissionPlanner(pair, "nearest", None) as planner:
         planner.plan()
         planner.submit(FAIL)
         yield planner
 
 
-def test_what_is_wrong_is_one_error_and_changes_nothing(planner, tmp_path):
+def test_invalid_input_is_one_error_and_changes_nothing(planner, tmp_path):
     """Out of order, twice, unknown, not a number, impossible: one line that names the field, and the same state."""
     plan = planner.plan()
     planner.save(tmp_path / "before.json")
@@ -72,8 +75,8 @@ def test_what_is_wrong_is_one_error_and_changes_nothing(planner, tmp_path):
     assert planner.plan() is plan
 
 
-def test_a_planner_that_was_killed_goes_on_with_the_same_plan(pair, tmp_path):
-    """Restored from its file it has the same plan and reasons, and makes the same ones from then on."""
+def test_a_killed_planner_is_restored_with_the_same_plan(pair, tmp_path):
+    """Restored from its file, it has the same plan and causes, and makes the same plans from then on."""
     file = tmp_path / "planner.json"
     later = [
         {"hour": 1.0, "event": "task-changes", "task": "t3", "workload": 3.0},
@@ -109,8 +112,8 @@ def test_a_planner_that_was_killed_goes_on_with_the_same_plan(pair, tmp_path):
             assert again.plan(20) == planner.plan(20)
 
 
-def test_damaged_files_are_told(pair, tmp_path):
-    """A file that is no planner, or was cut off or changed, is one line with its name."""
+def test_damaged_files_are_errors(pair, tmp_path):
+    """A file that is not a planner, or was truncated or edited, is a one-line error with its name."""
     file = tmp_path / "planner.json"
     with MissionPlanner(pair, "nearest") as planner:
         planner.save(file)
@@ -130,7 +133,7 @@ def test_damaged_files_are_told(pair, tmp_path):
 
 
 class Slow(Policy):
-    """Answers late, and counts its answers."""
+    """Decides late, and counts its decisions."""
 
     info = PolicyInfo(name="slow", summary="for tests")
 
@@ -144,7 +147,7 @@ class Slow(Policy):
 
 
 def test_the_deadline_holds_whatever_the_policy_does(pair):
-    """A policy that is late leaves the last orders; what it has answered by then counts, and the rest does later."""
+    """With a late policy, the last orders stay; orders given in time count now, and the others in the next plan."""
     policy = Slow(0.3)
     with MissionPlanner(pair, policy, deadline_ms=400) as planner:
         began = time.perf_counter()
@@ -160,8 +163,8 @@ def test_the_deadline_holds_whatever_the_policy_does(pair):
         assert dict(planner.plan()) == {"ann": Order("t2"), "ben": Order("t2")}
 
 
-def test_everybody_gets_a_turn_with_a_slow_policy():
-    """Where the time is never enough for all agents, each plan begins with those that had no turn in the last one."""
+def test_all_agents_get_a_turn_with_a_slow_policy():
+    """If time never suffices for all agents, each plan begins with those that had no turn in the last one."""
     many = Instance(ability=[1] * 10, workload=[99, 99], agent_position=[[0, 0]] * 10, task_position=[[9, 9]] * 2)
     hours = iter(range(1, 99))
     with MissionPlanner(many, Slow(0.04), deadline_ms=200) as planner:
@@ -175,7 +178,7 @@ def test_everybody_gets_a_turn_with_a_slow_policy():
 
 
 def test_ten_threads_at_once(pair, tmp_path):
-    """Reports, plans, pins and saves from ten threads: nothing is lost, and every plan can be followed."""
+    """With reports, plans, pins and saves from ten threads, nothing is lost, and every plan can be followed."""
     problems = []
 
     def work(number, planner, path):
@@ -205,8 +208,8 @@ def test_ten_threads_at_once(pair, tmp_path):
         assert planner.plan() is planner.plan()
 
 
-def test_asyncio_goes_on_while_it_plans(pair):
-    """A plan that is awaited in a thread lets the loop run: it turns many times meanwhile."""
+def test_asyncio_is_not_blocked_while_it_plans(pair):
+    """While a plan is awaited in a thread, the event loop keeps running."""
 
     async def turns():
         count = 0
@@ -223,7 +226,7 @@ def test_asyncio_goes_on_while_it_plans(pair):
 
 
 def test_a_closed_planner_says_so(pair):
-    """It answers with an error instead of waiting for ever."""
+    """A closed planner raises an error instead of waiting forever."""
     planner = MissionPlanner(pair, "nearest", None)
     planner.close()
     planner.submit(Event(0.5, "agent-fails", agent="ann"))

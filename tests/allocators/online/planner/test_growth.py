@@ -1,4 +1,4 @@
-"""What a planner costs depends on what is alive, not on what ever was: steps of Python are counted, not seconds."""
+"""Time and memory of a planner depend on present agents and tasks only; time is counted in steps of Python."""
 
 import gc
 import sys
@@ -18,7 +18,7 @@ FEW = 5
 
 
 class Steps:
-    """Counts the steps of Python in this thread and in those that begin while it is entered."""
+    """Counts the steps of Python in this thread and in threads started within the context."""
 
     def __init__(self):
         self.count, self.is_counting = 0, False
@@ -43,7 +43,7 @@ class Steps:
 
 @pytest.fixture
 def few(monkeypatch):
-    """Let no more than a few be kept."""
+    """Limit the number of closed entries that are kept."""
     for module, name in ((register, "MOST_OVER"), (leader, "MOST_OVER"), (picture, "MOST_NEWS")):
         monkeypatch.setattr(module, name, FEW)
 
@@ -63,7 +63,7 @@ def crew():
 
 
 def exchange(planner, number):
-    """Let a task and an agent come, and those go that came three before; plan after each event."""
+    """Add a task and an agent, and close those that came three exchanges before; plan after each event."""
     place, row = [number % 5, number % 3], {"id": f"a{number}", "ability": 1, "speed": 1}
     task = {"id": f"t{number}", "workload": 9, "position": place, "deadline": 9e5, "growth": 0.1}
     for event in (
@@ -77,7 +77,7 @@ def exchange(planner, number):
 
 
 def costs(planner, steps, numbers, file):
-    """Return the steps for some exchanges, and then the objects in memory and the length of the file."""
+    """Return the steps for some exchanges, and afterwards the objects in memory and the length of the file."""
     steps.count, steps.is_counting = 0, True
     for number in numbers:
         exchange(planner, number)
@@ -88,8 +88,8 @@ def costs(planner, steps, numbers, file):
 
 
 @pytest.mark.parametrize("policy", ["greedy", "hedonic", "auction"])
-def test_costs_do_not_grow_with_what_is_over(few, policy, tmp_path):
-    """After 100 agents and tasks more, exchanges take as many steps, and memory and the file as much room."""
+def test_costs_do_not_grow_with_closed_tasks_and_agents(few, policy, tmp_path):
+    """After 100 further agents and tasks, exchanges take as many steps, and memory and file are as large as before."""
     with Steps() as steps, MissionPlanner(crew(), policy, None) as planner:
         for number in range(3, 20):
             exchange(planner, number)  # until as many are over as are kept
@@ -105,8 +105,8 @@ def test_costs_do_not_grow_with_what_is_over(few, policy, tmp_path):
     assert len(planner._leader._agents) <= 3 + 2 * (3 + FEW)
 
 
-def test_what_was_long_over_is_unknown(few, tmp_path):
-    """The last tasks that are over can be opened again, in a planner that was restored as well; others come as new."""
+def test_old_closed_tasks_are_unknown(few, tmp_path):
+    """Only the last closed tasks can be reopened, also in a restored planner; older ids can be used anew."""
     with MissionPlanner(crew(), "nearest", None) as planner:
         for number in range(3, 40):
             exchange(planner, number)
@@ -127,8 +127,8 @@ def test_what_was_long_over_is_unknown(few, tmp_path):
                 assert again.plan() == planner.plan()
 
 
-def test_a_task_that_somebody_flies_to_is_not_forgotten(few):
-    """Whatever ends meanwhile: the agent that is on its way there gets the next order as any other."""
+def test_a_task_that_is_the_goal_of_a_flight_is_not_forgotten(few):
+    """Whatever is closed meanwhile, the agent on its way there gets its next order as usual."""
     with MissionPlanner(crew(), "nearest", None) as planner:
         planner.submit({"event": "task-appears", "task": {"id": "far", "workload": 1, "position": [500, 0]}})
         planner.pin("a0", "far")
@@ -142,8 +142,8 @@ def test_a_task_that_somebody_flies_to_is_not_forgotten(few):
         assert planner.plan().problem is None
 
 
-def test_news_of_which_no_plan_is_made_are_forgotten(few):
-    """Where nobody asks for plans for long, the last of what happened is kept."""
+def test_news_without_plans_are_limited(few):
+    """If no plan is requested for long, only the last news are kept."""
     with MissionPlanner(crew(), "nearest", None) as planner:
         planner.plan()
         for number in range(40):
@@ -153,8 +153,8 @@ def test_news_of_which_no_plan_is_made_are_forgotten(few):
         assert planner._picture.news == []
 
 
-def test_routes_remember_tasks_that_are_there(few, monkeypatch):
-    """What the policy `routes` keeps of growing tasks and of distances by a table goes when they are over."""
+def test_routes_forget_closed_tasks(few, monkeypatch):
+    """The policy `routes` drops its data on growing tasks and on distances by a table once tasks are closed."""
     monkeypatch.setattr(describe, "MOST_REMEMBERED", FEW)
     monkeypatch.setattr(tables, "MOST_WAYS", FEW)
     rows = [(f"t{i}", f"t{j}", 1.0) for i in range(3) for j in range(3) if i != j]

@@ -1,4 +1,4 @@
-"""Laws hold whatever is submitted in whatever order, and a planner that is restored on the way believes the same."""
+"""Conservation laws hold for any sequence of inputs, and a planner restored in between has the same state."""
 
 import json
 
@@ -11,7 +11,7 @@ from alloc.problems.missions.simulation import conservation
 
 
 def inputs(rng, step, agent, task):
-    """Return everything that may be said of an agent and a task, sensible or not."""
+    """Return all kinds of inputs about an agent and a task, consistent or not."""
     place, some = rng.random(2).tolist(), float(rng.random())
     whole_agent = {
         "id": f"new {step}",
@@ -39,7 +39,7 @@ def inputs(rng, step, agent, task):
 
 
 def test_laws_hold_and_plans_are_restored(tmp_path):
-    """Nothing is lost at any event of 20 drawn missions, and no policy fails; restored planners go on as the others."""
+    """Laws hold at all events of 20 random missions, no policy fails, and restored planners behave as the originals."""
     accepted = 0
     for seed in range(20):
         rng = np.random.default_rng(seed)
@@ -66,7 +66,7 @@ def test_laws_hold_and_plans_are_restored(tmp_path):
 
 
 def test_little_work_that_grows_is_accounted_for():
-    """What has grown since is no rounding error of what was there, however little that is."""
+    """Work that has grown is not mistaken for a rounding error, however little it is."""
     instance = Instance(ability=[1], workload=[1], agent_position=[[0, 0]], task_position=[[9, 9]], speed=[1])
     with MissionPlanner(Mission(instance, growth=[0.7]), "idle", None) as planner:
         planner.submit({"event": "task-changes", "task": instance.task_ids[0], "workload": 1e-12})

@@ -1,4 +1,4 @@
-"""A planner is told what happens and what agents report, and answers with orders, and why they changed."""
+"""A planner gets events and reports of agents, and returns orders with the causes of their changes."""
 
 import gc
 import math
@@ -14,12 +14,12 @@ from alloc.problems.missions.simulation.state import STAY, Order
 
 
 def tasks(planner):
-    """Return the task of each agent by the plan."""
+    """Return the task of each agent in the plan."""
     return {agent: order.task for agent, order in planner.plan().items()}
 
 
 def test_orders_follow_events(pair):
-    """The tasks of the plan, and the cause of each change: a failure, a new task, one that is done."""
+    """Plans follow a failure, a new task and a completion, and name them as causes."""
     with MissionPlanner(pair, "nearest", None) as planner:
         assert tasks(planner) == {"ann": "t1", "ben": "t2"}
         planner.submit(Event(1.5, "agent-fails", agent="ben"))
@@ -39,8 +39,8 @@ def test_orders_follow_events(pair):
         assert planner.hour == 3.25
 
 
-def test_reports_are_believed(pair):
-    """Where an agent is and what its battery holds count from then on, and so does the work that is left."""
+def test_reports_correct_the_state(pair):
+    """A reported place, battery or work left counts from then on."""
     with MissionPlanner(pair, "nearest", None) as planner:
         planner.plan()
         planner.submit(Report(0.5, "ann", position=(0, 0.2)))  # it is slow
@@ -57,7 +57,7 @@ def test_reports_are_believed(pair):
 
 
 def test_an_agent_that_cannot_go_on_has_no_order(pair):
-    """A battery that does not last for the flight ends it, and the cause says so."""
+    """A reported battery that does not suffice for the flight ends it, and the cause says so."""
     with MissionPlanner(pair, "nearest", None) as planner:
         planner.plan()
         planner.submit(Report(0.5, "ann", battery=0.25))
@@ -67,7 +67,7 @@ def test_an_agent_that_cannot_go_on_has_no_order(pair):
 
 
 def test_pinned_agents_stay_with_their_task(pair):
-    """No policy sends them elsewhere; the pin ends with the task, or when it is taken back."""
+    """No policy sends them elsewhere; a pin ends with its task, or when it is removed."""
     with MissionPlanner(pair, "nearest", None) as planner:
         planner.pin("ann", "t2")
         planner.pin("ben", None)
@@ -82,8 +82,8 @@ def test_pinned_agents_stay_with_their_task(pair):
                 planner.pin(agent, task)
 
 
-def test_what_will_come_is_not_known(pair):
-    """Of the agents, tasks and events that a mission says of later hours nothing happens before it is submitted."""
+def test_future_events_are_not_known(pair):
+    """Later agents, tasks and events of the mission have no effect before they are submitted."""
     mission = Mission(pair, appears=[0, 2], joins=[0, 1], events=[Event(0.5, "agent-fails", agent="ann")])
     with MissionPlanner(mission, "nearest", None) as planner:
         assert {agent: order.task for agent, order in planner.plan(2.5).items()} == {"ann": "t1"}
@@ -93,7 +93,7 @@ def test_what_will_come_is_not_known(pair):
 
 
 def test_deadlines_pass_by_themselves(pair):
-    """A task that is missed gets no more orders."""
+    """No agent is sent to a missed task."""
     with MissionPlanner(Mission(pair, deadline=[2, np.nan]), "nearest", None) as planner:
         assert tasks(planner) == {"ann": "t1", "ben": "t2"}
         assert planner.plan(2.0)["ann"] == Order("t2")
@@ -101,7 +101,7 @@ def test_deadlines_pass_by_themselves(pair):
 
 
 def test_work_that_was_not_done_by_the_deadline_is_missed(pair):
-    """Work that is reported of a done task after its deadline is too late: nobody is sent there."""
+    """If work of a done task is reported after its deadline, the task is missed, and no agent is sent there."""
     with MissionPlanner(Mission(pair, deadline=[4, np.nan]), "nearest", None) as planner:
         planner.plan()
         assert planner.plan(3.5)["ann"] != Order("t1")  # it is done at 3
@@ -111,8 +111,8 @@ def test_work_that_was_not_done_by_the_deadline_is_missed(pair):
 
 
 @pytest.mark.parametrize("policy", ["greedy", "hedonic"])
-def test_it_believes_what_the_simulation_makes_of_its_orders(policy):
-    """Told the events of a mission as they come, it gives the orders of a simulation, at the same hours."""
+def test_its_state_agrees_with_the_simulation(policy):
+    """Given the events of a mission as they happen, it gives the same orders as in a simulation, at the same hours."""
     compared = 0
     for seed in range(40):
         mission = random_mission_of_any_kind(np.random.default_rng(seed))
@@ -144,7 +144,7 @@ def test_it_believes_what_the_simulation_makes_of_its_orders(policy):
 
 
 class Stubborn(Policy):
-    """Answers what it is given, or fails."""
+    """Returns given orders, or fails."""
 
     info = PolicyInfo(name="stubborn", summary="for tests")
 
@@ -173,8 +173,8 @@ def test_a_policy_that_fails_leaves_the_last_plan(pair):
             assert dict(planner.plan()) == {"ben": Order("t1")}
 
 
-def test_what_is_void_is_forgotten(pair):
-    """However often agents are diverted, little more is kept than what is to come, and no garbage collected."""
+def test_void_entries_are_dropped(pair):
+    """However often agents are diverted, the agenda stays small, and no garbage is collected meanwhile."""
     seen = []
 
     def turn_round(view):
@@ -191,7 +191,7 @@ def test_what_is_void_is_forgotten(pair):
 
 
 def test_settings_belong_to_names(pair):
-    """Parameters of a policy that is an object are an error, and so are those that it does not have."""
+    """Parameters for a policy given as an object, and unknown parameters, are errors."""
     with pytest.raises(InputError, match="policy: is an object with its own parameters"):
         MissionPlanner(pair, Stubborn(lambda view: None), stay=1)
     with pytest.raises(InputError, match="takes no option 'sty'"):

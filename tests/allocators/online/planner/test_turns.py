@@ -1,4 +1,4 @@
-"""A policy that decides for agents in turn gives the orders that each agent would give itself."""
+"""A policy that decides for agents in turn gives the same orders as separate decisions."""
 
 import numpy as np
 import pytest
@@ -15,14 +15,14 @@ pytestmark = pytest.mark.slow  # loops are compiled first
 
 
 class OneByOne(NetworkPolicy):
-    """The same network, asked for each agent by itself."""
+    """The same network with a separate decision for each agent."""
 
     def begin_turns(self, briefing):
         return None
 
 
 def crowd(rng: np.random.Generator) -> Mission:
-    """Return agents in a square, more than are decided for at once, with lists, skills, ranges and small batteries."""
+    """Return more agents than one batch, in a square, with allowed tasks, skills, ranges and small batteries."""
     n, m = 40, 12
     some = [sorted(rng.choice(m, 5, replace=False).tolist()) if rng.random() < 0.3 else None for _ in range(n)]
     instance = Instance(
@@ -44,7 +44,7 @@ def crowd(rng: np.random.Generator) -> Mission:
 
 
 def told(planner: MissionPlanner, rng: np.random.Generator, step: int) -> dict[str, object]:
-    """Return something that may happen."""
+    """Return a random event."""
     agents, tasks = list(planner._picture.state.agents), list(planner._picture.state.tasks)
     agent, task = rng.choice(agents).facts.id, rng.choice(tasks).facts.id
     return [
@@ -57,10 +57,10 @@ def told(planner: MissionPlanner, rng: np.random.Generator, step: int) -> dict[s
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_orders_are_those_of_each_by_itself(seed, monkeypatch):
-    """In drawn missions of all kinds both planners have the same plans, whatever happens.
+def test_orders_are_those_of_separate_decisions(seed, monkeypatch):
+    """In random missions of all kinds, both planners have the same plans, whatever happens.
 
-    By itself an agent guesses what free neighbours will choose, which it need not where they choose in turn.
+    In separate decisions, an agent guesses the choices of free neighbours, which is not needed in turns.
     """
     for module in (gappo, network_turns):
         monkeypatch.setattr(module, "ways_of", lambda view: OTHER_WAYS)
@@ -83,8 +83,8 @@ def test_orders_are_those_of_each_by_itself(seed, monkeypatch):
         assert orders > 100 or seed % 2 == 0  # those of any kind are small, and may leave nothing to do
 
 
-def test_who_was_not_asked_has_not_decided() -> None:
-    """Turns that are broken off count for those before that alone: the others consider their options the next time."""
+def test_agents_without_a_turn_have_not_decided() -> None:
+    """If turns are broken off, only agents before that have decided; the others decide the next time."""
     considered = []
     for is_broken_off in (False, True):
         with MissionPlanner(crowd(np.random.default_rng(1)), "gappo", None) as planner:
