@@ -1,4 +1,4 @@
-"""All groups of a task that a better plan may have, written out by a depth-first search; compiled."""
+"""Enumeration of all groups of a task that a better plan may use, by depth-first search; compiled."""
 
 from collections.abc import Callable
 
@@ -13,31 +13,31 @@ from alloc.allocators.runtime.compiled import compiled
 from alloc.problems.instance import FloatArray
 
 MAX_NODES = 200_000
-"""Nodes of the search for the groups of one task after which they count as too many."""
+"""Limit on the nodes of the search for the groups of one task; beyond it, there are too many groups."""
 
 ROUNDED_UP = 1 + 1e-12
-"""Factor on a need so that sums of weights in any order exceed it."""
+"""Factor on a need that sums of weights exceed regardless of rounding in the order of summation."""
 
 Cuts = tuple[WholeArray, WholeArray, FloatArray]
-"""The cuts that each pair is in, and their penalties: ``first_cut``, ``cut`` and ``penalty`` of `write_groups`."""
+"""The cuts of each pair, and their penalties: ``first_cut``, ``cut`` and ``penalty`` of `write_groups`."""
 
 
 def groups_within(
     model: EnergyModel, paid: FloatArray, limit: FloatArray, cuts: Cuts, most: int, should_stop: Callable[[], bool]
 ) -> tuple[WholeArray, csr_array] | None:
-    """Return all groups of each task that cost at most `limit`; None if they are more than `most`, or it should stop.
+    """Return all groups of each task that cost at most `limit`; None if more than `most`, or if stopped.
 
     Parameters
     ----------
     model : EnergyModel
     paid : ndarray, shape (p,)
-        What an agent of each pair costs.
+        Cost of an agent of each pair.
     limit : ndarray, shape (t,)
-        Of each task.
+        Largest cost of a group of each task.
     cuts : tuple of ndarray
     most : int
     should_stop : callable
-        Asked between tasks, as all together may take a second.
+        Called between tasks, as all together may take a second.
 
     Returns
     -------
@@ -71,21 +71,21 @@ def write_groups(
     weight: FloatArray, price: FloatArray, copies: WholeArray, need: float, max_weight: int, whole: bool,
     first_cut: WholeArray, cut: WholeArray, penalty: FloatArray, limit: float, group: WholeArray,
 ) -> int:  # fmt: skip
-    """Write the groups of one task that cost at most `limit`, penalties included, and return how many they are.
+    """Write the groups of one task that cost at most `limit`, penalties included, and return their number.
 
-    Where sums of weights have no limit, groups that can do without one of their agents are left out.
+    If sums of weights are unlimited, only minimal groups are written.
 
     Parameters
     ----------
     weight, price, copies, need, max_weight, whole, first_cut, cut, penalty
         As in `pricing.price_groups`.
     group : ndarray of int, shape (g, p)
-        Zeros; gets the agents of each group.
+        Output, initially zeros: the agents of each group.
 
     Returns
     -------
     int
-        More than there is room for in `group` where they are too many.
+        A number larger than the capacity of `group` if there are too many.
     """
     exact, taken = max_weight >= 0, np.zeros(len(penalty), dtype=np.int64)
     item, items = list_items(weight, price, copies, first_cut, True)[0], copies.sum()
@@ -109,7 +109,7 @@ def write_groups(
             if not is_open or q == items:
                 q -= 1
                 continue
-        elif take[q]:  # that branch has been searched
+        elif take[q]:  # this branch has been searched
             count_cuts(item[q], -1, first_cut, cut, taken)
         if branches[q] == 2:
             q -= 1
@@ -119,7 +119,7 @@ def write_groups(
         done[q + 1], paid[q + 1], branches[q + 1] = done[q], paid[q], 0
         if take[q]:
             done[q + 1] += weight[k]
-            is_alike = q > 0 and item[q - 1] == k and not take[q - 1]  # of agents alike the first come first
+            is_alike = q > 0 and item[q - 1] == k and not take[q - 1]  # symmetry: identical agents are taken in order
             if is_alike or (done[q + 1] > top if exact else done[q] >= need):
                 take[q] = False
                 continue
@@ -131,7 +131,7 @@ def write_groups(
 
 @compiled
 def is_minimal(done: float, need: float, weight: FloatArray, item: WholeArray, take: NDArray[np.bool_]) -> bool:
-    """Whether the agents taken meet the need, and none of them can stay away."""
+    """Whether the agents taken meet the need, and none of them can be left out."""
     least = np.inf
     for z in range(len(item)):
         if take[z]:

@@ -1,8 +1,8 @@
-"""Cuts over clusters of tasks: a cluster must get whole agents too, which a mixture of groups may not give it.
+"""Cuts over clusters of tasks: a cluster must get integer numbers of agents as well, which mixtures of groups violate.
 
-The agents of each class that a cluster gets in all are a whole solution of a knapsack. Where those of a mixture lie
-outside the convex hull of these solutions, a linear function of them is larger than it is at any solution: a cut. It is
-sought by Kelley's method: functions that all solutions known satisfy, and the solution that violates the best of them.
+The total numbers of agents of each class on a cluster are an integer solution of a knapsack. If those of a mixture lie
+outside the convex hull of these solutions, some linear function separates them: a cut. It is found by Kelley's method,
+which alternates between the best function for the known solutions and the solution that violates it most.
 
 References
 ----------
@@ -21,28 +21,28 @@ from alloc.allocators.exact.energy.subproblems import solve_subproblems
 from alloc.problems.instance import FloatArray, IntArray
 
 LEAST_VIOLATION = 0.02
-"""Violation from which a cut is added, where its largest factor is 1."""
+"""Least violation of an added cut, scaled to a largest coefficient of 1."""
 
 MOST_ROUNDS, MUCH_MORE = 40, 1.1
-"""Solutions sought for one cut, and by which factor its violation may still grow for more to be sought."""
+"""Limit on the solutions computed for one cut, and the possible growth of its violation needed to compute more."""
 
 TURN, MOST_CUTS = 60, 40
-"""Clusters of which cuts are sought, and cuts of them, before the mixture changes, if there are any cuts."""
+"""Limits on clusters that are separated, and on cuts found, before the mixture is updated."""
 
 WHOLE, MOST_BROKEN = 1e-6, 30
-"""Distance from a whole number from which agents count as broken up, and classes of such agents above which a cluster
-is left out."""
+"""Distance from an integer from which agents count as fractional, and number of fractional classes above which a
+cluster is skipped."""
 
 MOST_KNOWN, MOST_SHARING = 2000, 500
-"""Clusters whose knapsacks are kept, and clusters of tasks that share agents, at the most."""
+"""Limits on the clusters whose knapsacks are cached, and on clusters of tasks that share agents."""
 
 PRECISION = 1e-9
-"""By how much a cut is loosened for rounding."""
+"""Slack added to a cut for rounding errors."""
 
 
 @dataclass(frozen=True, eq=False)
 class ClusterCut:
-    """The agents of a cluster, each times the factor of its class, sum to the limit at the most.
+    """The sum of the factors of a cluster's agents is at most the limit.
 
     Attributes
     ----------
@@ -57,18 +57,18 @@ class ClusterCut:
     limit: float
 
     def use(self, use: FloatArray, task: IntArray) -> FloatArray:
-        """Return what groups use of the cut, given their agents of each class, shape (g, k), and their tasks."""
+        """Return the coefficients of groups in the cut, given their agents of each class, shape (g, k), and tasks."""
         return np.asarray(np.where(self.inside[task], use @ self.factor, 0.0))
 
 
 class ClusterSeparation:
-    """Seeks violated cuts of clusters.
+    """Separates violated cuts of clusters.
 
     Parameters
     ----------
     model : EnergyModel
     member : ndarray of bool, shape (f, t)
-        The tasks of each cluster; those that share agents in the mixture are clusters as well.
+        The tasks of each cluster; sets of tasks that share agents in the mixture are added.
     """
 
     def __init__(self, model: EnergyModel, member: Mask) -> None:
@@ -80,10 +80,10 @@ class ClusterSeparation:
     def violated(
         self, use: FloatArray, task: IntArray, part: FloatArray, should_stop: Callable[[], bool]
     ) -> list[ClusterCut]:
-        """Return cuts that a mixture violates, of clusters that break up few agents first: theirs are cut most often.
+        """Return cuts that a mixture violates; clusters with few fractional classes come first.
 
-        Of 341 clusters of an instance with 500 agents and 30 tasks, those that have parts of agents of 1 or 2 classes
-        were cut in 78 % of all cases, with 3 to 9 classes in 40 %, with 15 or more in none, and took longer.
+        Of 341 clusters of an instance with 500 agents and 30 tasks, those with 1 or 2 fractional classes were cut in
+        78 % of all cases, those with 3 to 9 in 40 %, and those with 15 or more never, which also took longer.
 
         Parameters
         ----------
@@ -92,7 +92,7 @@ class ClusterSeparation:
         task : ndarray of int, shape (g,)
         part : ndarray, shape (g,)
         should_stop : callable
-            Asked between clusters.
+            Called between clusters.
         """
         cuts: list[ClusterCut] = []
         mixed = np.zeros((len(self._model.need), use.shape[1]))
@@ -115,13 +115,13 @@ class ClusterSeparation:
         return cuts
 
     def _rest(self, inside: Mask, *, found: bool) -> None:
-        """Leave a cluster without a cut out of the next turns, twice as many each time."""
+        """Skip a cluster without a cut in the next turns, twice as many each time."""
         key = inside.tobytes()
         self._pause[key] = 1 if found else 2 * self._pause.get(key, 1)
         self._due[key] = 0 if found else self._turn + self._pause[key]
 
     def _knapsack(self, inside: Mask) -> EnergyModel:
-        """Return the knapsack of a cluster; built when it is first asked for, as there are many."""
+        """Return the knapsack of a cluster, built on first use, as there are many."""
         key = inside.tobytes()
         if key not in self._knapsacks:
             if len(self._knapsacks) >= MOST_KNOWN:
@@ -133,7 +133,7 @@ class ClusterSeparation:
         return self._knapsacks[key]
 
     def _cut_of(self, inside: Mask, mixed: FloatArray) -> list[ClusterCut]:
-        """Return a cut of a cluster that has `mixed` agents of each class, shape (k,); none if none is violated."""
+        """Return a cut violated by `mixed` agents of each class on a cluster, shape (k,), or no cut."""
         knapsack, key = self._knapsack(inside), inside.tobytes()
         agents = mixed[knapsack.class_of_pair]
         if self._is_whole(knapsack, key, agents):
@@ -146,10 +146,10 @@ class ClusterSeparation:
         return [ClusterCut(inside, whole, PRECISION - cost)]
 
     def _is_whole(self, knapsack: EnergyModel, key: bytes, agents: FloatArray) -> bool:
-        """Whether a mixture is one of solutions, as a smaller knapsack shows; add those found to the points.
+        """Whether a mixture is a convex combination of solutions; add those found to the points.
 
-        A mixture of solutions with none, or all, of a class is one of solutions with none, or all. So only the other
-        classes, those that are open, count.
+        Classes of which the mixture has none, or all, are fixed accordingly in all these solutions, so that a smaller
+        knapsack over the other classes decides.
         """
         is_open, ends = (agents > WHOLE) & (agents < knapsack.copies - WHOLE), np.round(agents)
         points, done = self._points[key], int(knapsack.weight[~is_open] @ ends[~is_open])
@@ -174,14 +174,14 @@ class ClusterSeparation:
 def _most_violated(
     knapsack: EnergyModel, agents: FloatArray, points: FloatArray
 ) -> tuple[FloatArray | None, float, FloatArray]:
-    """Return factors of a violated cut, or None, the least of minus its use, and solutions known, shape (s, p).
+    """Return the factors of a violated cut or None, the minimum of its negative use, and known solutions, shape (s, p).
 
     Parameters
     ----------
     agents : ndarray, shape (p,)
-        Of each class in the mixture.
+        Agents of each class in the mixture.
     points : ndarray, shape (s, p)
-        Solutions to begin with.
+        Initial solutions.
     """
     function = _Separator(agents, points, is_exact=bool(knapsack.max_weight[0] >= 0))
     best, found, limit, known = LEAST_VIOLATION, None, 0.0, [points]
@@ -201,14 +201,14 @@ def _most_violated(
 
 
 def sharing_clusters(mixed: FloatArray, most: int) -> Mask:
-    """Return clusters of tasks that share agents in a mixture, shape (f, t), at most about as many as given.
+    """Return about `most` clusters, at most, of tasks that share agents in a mixture, shape (f, t).
 
-    Each task is joined, one after another, by the task with which those so far share the most.
+    Each cluster starts from a task and is extended by the task that shares most agents with it.
 
     Parameters
     ----------
     mixed : ndarray, shape (t, k)
-        Agents of each class on each task, parts of which are shared.
+        Numbers of agents of each class on each task, fractional if shared.
     most : int
     """
     tasks = len(mixed)
@@ -226,14 +226,14 @@ def sharing_clusters(mixed: FloatArray, most: int) -> Mask:
 
 
 def _distance_from_whole(number: FloatArray) -> FloatArray:
-    """Return how far numbers are from the nearest whole ones."""
+    """Return the distances of numbers from the nearest integers."""
     return np.asarray(np.abs(number - np.round(number)))
 
 
 class _Separator:
-    """The linear function whose value at a mixture exceeds that at all solutions known by most: a linear programme.
+    """The linear function with the largest violation by a mixture relative to all known solutions: a linear programme.
 
-    Factors are from -1 to 1, or to 0 where solutions may be larger than is needed.
+    Factors are from -1 to 1, or to 0 if solutions may exceed their need.
     """
 
     def __init__(self, mixed: FloatArray, points: FloatArray, *, is_exact: bool) -> None:
@@ -257,7 +257,7 @@ class _Separator:
         self._highs.addRow(0.0, highspy.kHighsInf, len(self._index), self._index, np.append(-point, 1.0))
 
     def most_violated(self) -> tuple[FloatArray, float]:
-        """Return the factors and by how much they may be violated; less than 0 where that cannot be said."""
+        """Return the factors and an upper bound on their violation; negative if that is unknown."""
         self._highs.run()
         if self._highs.getModelStatus() != highspy.HighsModelStatus.kOptimal:
             return np.zeros(len(self._index) - 1), -1.0

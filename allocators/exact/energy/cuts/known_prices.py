@@ -1,4 +1,4 @@
-"""Prices and penalties met before: a better plan has no group that costs too much at any of them."""
+"""Earlier prices and penalties: a better plan uses no group that is too expensive at any of them."""
 
 from dataclasses import dataclass
 
@@ -10,23 +10,23 @@ from alloc.allocators.exact.knapsack import WholeArray
 from alloc.problems.instance import FloatArray, IntArray
 
 MOST_KNOWN, MOST_CELLS = 40, 2_000_000
-"""Prices kept, and cells of all their tables, at the most."""
+"""Limits on the number of prices kept, and on the cells of all their tables."""
 
 
 @dataclass(frozen=True, eq=False)
 class Prices:
-    """What groups cost at some prices and penalties.
+    """Costs of groups at some prices and penalties.
 
     Attributes
     ----------
     paid : ndarray, shape (t, k)
-        What an agent of each class costs on each task with its price and the cuts of clusters.
+        Cost of an agent of each class on each task, including its price and the cuts of clusters.
     penalty : ndarray, shape (c,)
-        Of each cut.
+        Penalty of each cut.
     value : float
-        The bound.
+        The lower bound.
     least : ndarray, shape (t,)
-        What any group of each task costs at least.
+        Lower bound on the cost of any group of each task.
     """
 
     paid: FloatArray
@@ -36,13 +36,13 @@ class Prices:
 
 
 class KnownPrices:
-    """The last prices and penalties at which cuts were sought."""
+    """The last prices and penalties at which cuts were separated."""
 
     def __init__(self) -> None:
         self._known: list[Prices] = []
 
     def note(self, model: EnergyModel, paid: FloatArray, penalty: FloatArray, value: float, least: FloatArray) -> None:
-        """Keep prices, given what an agent of each pair costs at them, shape (p,)."""
+        """Record prices, given the cost of an agent of each pair at them, shape (p,)."""
         table = np.full((len(model.need), len(model.count)), np.inf)
         table[model.task_of_pair, model.class_of_pair] = paid
         self._known.append(Prices(table, penalty.copy(), value, least.copy()))
@@ -51,7 +51,7 @@ class KnownPrices:
     def within(
         self, model: EnergyModel, cost: float, task: WholeArray, group: csr_array, used: FloatArray, sets: IntArray
     ) -> Mask:
-        """Return which groups a plan that costs less than `cost` can have, shape (g,).
+        """Return which groups a plan that costs less than `cost` can use, shape (g,).
 
         Parameters
         ----------
@@ -59,9 +59,9 @@ class KnownPrices:
         group : csr_array, shape (g, p)
             Agents of each pair.
         used : ndarray, shape (g, c)
-            What each group uses of each cut.
+            Coefficient of each group in each cut.
         sets : ndarray of int
-            The cuts over classes, whose penalties no pair pays.
+            The cuts over classes, whose penalties are not part of the costs of pairs.
         """
         can = np.ones(len(task), dtype=bool)
         for known in self._known:

@@ -1,9 +1,9 @@
-"""The cheapest group of a task where some sets of classes cost a penalty: a knapsack and a tree search; compiled.
+"""The cheapest group of a task with penalties on sets of classes: a knapsack and a tree search, compiled.
 
-A cut counts the agents that a group takes from a set of classes; each second one costs the penalty of the cut. Without
-penalties a table by dynamic programming bounds what the rest of a group costs, which guides a depth-first search over
-the agents, those in cuts first. Where weights are whole, the table itself has the answer for all others. Where they
-are not, it rounds them up, and the search goes on to the last agent.
+A cut counts the agents that a group takes from a set of classes; every second one costs the cut's penalty. A dynamic
+programme without penalties bounds the cost of the rest of a group, which guides a depth-first search over the agents,
+those in cuts first. With integer weights, the table is exact for all other agents. Otherwise it is based on weights
+rounded up, and the search continues to the last agent.
 """
 
 import numpy as np
@@ -14,10 +14,10 @@ from alloc.allocators.runtime.compiled import compiled
 from alloc.problems.instance import FloatArray
 
 MAX_NODES = 20_000
-"""Nodes of the search for one group after which it ends with the bound of the nodes still open."""
+"""Limit on the nodes of the search for one group, which then returns the bound of the open nodes."""
 
 STEPS, MOST_STEPS, CELLS = 1000, 10_000, 200_000
-"""Steps of a need to which the table rounds where weights are not whole, at least and at most, and cells in between."""
+"""Minimum and maximum number of steps of a need for non-integer weights, and the target number of table cells."""
 
 
 @compiled
@@ -26,25 +26,25 @@ def price_groups(
     max_weight: WholeArray, whole: bool, first_cut: WholeArray, cut: WholeArray, penalty: FloatArray,
     cost: FloatArray, group: WholeArray,
 ) -> float:  # fmt: skip
-    """Write the cheapest group of each task that is cheaper than one known, and return what all groups cost at least.
+    """Write the cheapest group of each task if it is cheaper than the known one; return a bound on their total cost.
 
     Parameters
     ----------
     first : ndarray of int, shape (t + 1,)
-        Where the pairs of each task begin.
+        Index of the first pair of each task.
     weight, price, copies : ndarray, shape (p,)
     need, max_weight : ndarray, shape (t,)
-        Sums of weights; no limit where the latter is below 0.
+        Smallest and largest sum of weights; the latter is unlimited if negative.
     whole : bool
-        Whether weights and needs are whole numbers.
+        Whether weights and needs are integers.
     first_cut, cut : ndarray of int, shapes (p + 1,) and (c,)
-        The cuts that each pair is in.
+        The cuts of each pair: `cut` from each `first_cut` to the next.
     penalty : ndarray, shape (cuts,)
         >= 0.
     cost : ndarray, shape (t,)
-        Of the cheapest group known of each task; in the end what any group costs at least.
+        Input: the cost of the cheapest known group of each task; output: a lower bound on the cost of any group.
     group : ndarray of int, shape (p,)
-        Zeros; stays so where no group is cheaper.
+        Output, initially zeros, unchanged for tasks without a cheaper group.
     """
     total, taken = 0.0, np.zeros(len(penalty), dtype=np.int64)
     for j in range(len(need)):
@@ -62,7 +62,7 @@ def cheapest_with_cuts(
     weight: FloatArray, price: FloatArray, copies: WholeArray, need: float, max_weight: int, whole: bool,
     first_cut: WholeArray, cut: WholeArray, penalty: FloatArray, taken: WholeArray, best: float, group: WholeArray,
 ) -> float:  # fmt: skip
-    """Do the work of `price_groups` for one task; `taken` counts agents in each cut, 0 before and after."""
+    """Implement `price_groups` for one task; `taken` is scratch for agents in each cut, 0 before and after."""
     exact, slack = max_weight >= 0, 1e-9 * (abs(best) + (np.abs(price).max() if len(price) else 0.0))
     if not exact:
         copies = of_interest(weight, price, copies, need, best - slack)
@@ -89,7 +89,7 @@ def cheapest_with_cuts(
             if not is_open:
                 q -= 1
                 continue
-        elif take[q]:  # that branch has been searched
+        elif take[q]:  # this branch has been searched
             count_cuts(item[q], -1, first_cut, cut, taken)
         if branches[q] == 2:
             q -= 1
@@ -97,7 +97,7 @@ def cheapest_with_cuts(
         k, with_it = item[q], np.inf
         paid_with = paid[q] + price[k] + fine_of(k, first_cut, cut, penalty, taken)
         after = int(np.ceil((done[q] + weight[k]) * scale))
-        if (after <= top or not exact) and (q == 0 or item[q - 1] != k or take[q - 1]):  # of agents alike the first
+        if (after <= top or not exact) and (q == 0 or item[q - 1] != k or take[q - 1]):  # symmetry
             with_it = paid_with + rest[q + 1, min(after, top)]
         take[q] = (with_it < paid[q] + rest[q + 1, here]) == (branches[q] == 0)
         branches[q] += 1
@@ -114,9 +114,9 @@ def cheapest_with_cuts(
 
 @compiled
 def of_interest(weight: FloatArray, price: FloatArray, copies: WholeArray, need: float, best: float) -> WholeArray:
-    """Return the copies of classes of which a group can have agents that costs less than `best`, zero of the others.
+    """Return `copies`, with zeros for classes that no group cheaper than `best` uses.
 
-    By the linear relaxation without penalties, for prices >= 0 and sums of weights without a limit.
+    This follows from the linear relaxation without penalties, for prices >= 0 and unlimited sums of weights.
     """
     ratio, total, relaxed, rate = price / weight, 0.0, 0.0, 0.0
     if len(price) == 0 or price.min() < 0:
@@ -138,7 +138,7 @@ def of_interest(weight: FloatArray, price: FloatArray, copies: WholeArray, need:
 def list_items(
     weight: FloatArray, price: FloatArray, copies: WholeArray, first_cut: WholeArray, whole: bool
 ) -> tuple[WholeArray, int]:
-    """Return the class of each agent, those in cuts first, and how many of them the search decides on."""
+    """Return the class of each agent, those in cuts first, and the number of agents on which the search branches."""
     item, items, searched = np.empty(copies.sum(), dtype=np.int64), 0, 0
     order = order_of(price / weight)
     for in_cuts in (True, False):
@@ -155,7 +155,7 @@ def list_items(
 def tabulate_rest(
     weight: FloatArray, price: FloatArray, item: WholeArray, scale: float, need: int, top: int, exact: bool
 ) -> FloatArray:
-    """Return the least cost of agents q, q + 1, ... where those before weigh s, shape (agents + 1, top + 1)."""
+    """Return the least cost of agents q, q + 1, ... if those before weigh s, shape (agents + 1, top + 1)."""
     rest = np.full((len(item) + 1, top + 1), np.inf)
     rest[len(item), need:] = 0.0
     for q in range(len(item) - 1, -1, -1):
@@ -175,7 +175,7 @@ def write_group(
     item: WholeArray, take: NDArray[np.bool_], weight: FloatArray, rest: FloatArray, done: int, top: int,
     group: WholeArray,
 ) -> None:  # fmt: skip
-    """Write the agents taken of the first ones, and the cheapest of the others by the table."""
+    """Write the agents that the search has taken, and the cheapest choice of the others by the table."""
     group[:] = 0
     for q in range(len(item)):
         if q < len(take):
@@ -187,14 +187,14 @@ def write_group(
 
 @compiled
 def count_cuts(k: int, change: int, first_cut: WholeArray, cut: WholeArray, taken: WholeArray) -> None:
-    """Count an agent of class `k`, or no longer, in the cuts that it is in."""
+    """Add `change` to the number of agents in the cuts of class `k`."""
     for z in range(first_cut[k], first_cut[k + 1]):
         taken[cut[z]] += change
 
 
 @compiled
 def fine_of(k: int, first_cut: WholeArray, cut: WholeArray, penalty: FloatArray, taken: WholeArray) -> float:
-    """Return the penalties that one more agent of class `k` costs."""
+    """Return the penalties of one more agent of class `k`."""
     fine = 0.0
     for z in range(first_cut[k], first_cut[k + 1]):
         if taken[cut[z]] % 2 == 1:

@@ -1,7 +1,7 @@
-"""Cuts over sets of at most three classes that a mixture of groups violates; compiled.
+"""Separation of cuts over sets of up to three classes (subset-row inequalities), compiled.
 
-Of a set of classes with an odd number of agents c, groups can take pairs (c - 1) / 2 times at most: each group counts
-half its agents of the set, rounded down. A mixture of groups may exceed that.
+From a set of classes with an odd number c of agents, all groups together can take at most (c - 1) / 2 disjoint pairs of
+agents: each group counts half its agents of the set, rounded down. A mixture of groups may violate this.
 
 References
 ----------
@@ -16,24 +16,24 @@ from alloc.allocators.runtime.compiled import compiled
 from alloc.problems.instance import FloatArray
 
 MOST_WORK = 100_000_000
-"""Looks at a group after which no further sets are sought: some tenths of a second."""
+"""Limit on the number of visits to groups, some tenths of a second, after which the search ends."""
 
 
 @compiled
 def violated_sets(
     use: WholeArray, part: FloatArray, count: WholeArray, least: float, most: int
 ) -> tuple[WholeArray, FloatArray]:
-    """Return sets of classes whose cut is violated by `least` or more, shape (s, 3), and by how much.
+    """Return the sets of classes whose cuts are violated by at least `least`, shape (s, 3), and the violations.
 
     Parameters
     ----------
     use : ndarray of int, shape (k + 1, g)
         Agents of each class in each group of the mixture; the last row, of zeros, pads sets of fewer than three.
     part : ndarray, shape (g,)
-        Part of each group.
+        Weight of each group in the mixture.
     count : ndarray of int, shape (k + 1,)
     most : int
-        Sets at the most.
+        Largest number of sets.
     """
     classes, found, work = len(use) - 1, 0, 0
     near = np.zeros((classes, classes + 1), dtype=np.bool_)
@@ -55,7 +55,7 @@ def violated_sets(
                 c = others[y]
                 if (b == c and b < classes) or (count[a] + count[b] + count[c]) % 2 == 0:
                     continue
-                if (c == classes or near[b, c]) and a > b:  # found from the least one
+                if (c == classes or near[b, c]) and a > b:  # found from its smallest class
                     continue
                 halves = -1.0 * ((count[a] + count[b] + count[c]) // 2)
                 for g in range(len(part)):

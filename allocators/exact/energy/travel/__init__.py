@@ -1,1 +1,1 @@
-"""A search for plans of less energy that prices the work of agents, for weights that depend on the task."""
+"""A search for plans of less energy by prices of work, for weights that depend on the task."""

@@ -1,4 +1,4 @@
-"""The annealed search within the energy stage: which plans it submits, and at which makespan it looks for them."""
+"""The annealing search as a phase of the energy stage: its turns, target makespan, and submission of plans."""
 
 import numpy as np
 
@@ -11,32 +11,32 @@ from alloc.allocators.exact.model import ROUNDING, Model
 from alloc.problems.evaluation import last_equal
 
 MAX_PAIRS = 2_000_000
-"""Agents times tasks above which tables take too much memory."""
+"""Number of agents times tasks above which tables take too much memory."""
 
 CALLS = 10
-"""Repartitions in a round of the timer."""
+"""Number of repartitions in a round of the timer."""
 
 REPEATABLE_CALLS = 2000
-"""Repartitions of a turn where effort is counted."""
+"""Number of repartitions of a turn in repeatable runs."""
 
 WORTHWHILE = 2e-3
-"""Relative gain from which a plan is submitted at the end of a cycle. A plan is a little faster than it has to be, and
-those that come after must be as fast, so that each costs some energy."""
+"""Relative gain from which a plan is submitted at the end of a cycle. A submitted plan is slightly faster than
+required, and later plans must be as fast, so that each submission costs some energy."""
 
 PATIENCE, LEAST_SHARE = 1.0, 0.3
-"""Time without a better plan, as a multiple of the time until the best was found, after which the search has stalled,
-and share of the stage that the latter counts as at least."""
+"""Time without a better plan, as a multiple of the time until the best was found, after which the search has stalled;
+and lower limit of the latter, as a share of the stage."""
 
 
 class TravelPhase:
-    """Looks for plans of less energy by `TravelSearch`, beside the bounds of `PrimalDual`, from which it has prices.
+    """Searches for plans of less energy by `TravelSearch`, with prices from the bounds of `PrimalDual`.
 
     Parameters
     ----------
     search : Search
-        Its best plan serves all tasks with workload.
+        The run; its best plan must serve all tasks with workload.
     model : Model
-        Classes told apart by place.
+        Classes that distinguish places.
     """
 
     def __init__(self, search: Search, model: Model) -> None:
@@ -56,9 +56,9 @@ class TravelPhase:
         return model.travel_time is not None and model.min_served == tasks > 1 and agents * tasks <= MAX_PAIRS
 
     def turn(self, both: PrimalDual) -> None:
-        """Search for as long as others did since the last turn, or by count, once there are prices.
+        """Once there are prices, search for as long as other phases did since the last turn, or by count.
 
-        What a cycle has found is submitted at its end.
+        Plans of a cycle are submitted at its end.
         """
         search, annealing = self._search, self._annealing
         until_s = 2 * search.elapsed_s - self._last_s
@@ -91,7 +91,7 @@ class TravelPhase:
         return self._search.elapsed_s - self._found_s > PATIENCE * took_s
 
     def _begin_cycle(self) -> None:
-        """Take note of the best plan, and of its makespan, which may be less than before."""
+        """Adopt the best plan and its makespan, which may be less than before."""
         search, model = self._search, self._model
         assert search.best is not None
         limit, plan = search.makespan_limit, search.best.allocation

@@ -1,9 +1,9 @@
-"""The best way to share the agents of a few tasks among these tasks, at prices of work; compiled.
+"""Optimal repartition of the agents of a few tasks among these tasks, at prices of work; compiled.
 
-With a price of the work on each task, the cost of an agent less the price of its work is least on one of the tasks. By
-how much it is more where the agent goes is its regret. Up to a constant, a plan costs the regrets of all agents and the
-price of the work beyond needs. A depth-first search with that as a bound finds the best of all ways to share a dozen
-agents among two or three tasks in some hundred nodes, as agents near one task have large regrets elsewhere.
+With a price of work on each task, the reduced cost of an agent is its cost less the price of its work; the regret of a
+choice is its reduced cost minus the least one. Up to a constant, the cost of a plan is the sum of all regrets and the
+price of work beyond the needs. A depth-first search with this bound optimally distributes a dozen agents over two or
+three tasks in some hundred nodes, as agents near one task have large regrets elsewhere.
 
 References
 ----------
@@ -19,20 +19,20 @@ from alloc.allocators.runtime.compiled import compiled
 from alloc.problems.instance import FloatArray
 
 LEAST_GAIN = 1e-9
-"""Least gain of a change, in mean flights."""
+"""Smallest gain of a change, in mean flights."""
 
 
 class Tasks(NamedTuple):
-    """The work done on some tasks, and its prices; needs are 1, and costs in mean flights.
+    """The work done on some tasks, and its prices; needs are 1, and costs are in mean flights.
 
     Attributes
     ----------
     done : ndarray, shape (t,)
-        Work by agents that stay.
+        Work by agents outside the pool.
     price : ndarray, shape (t,)
-        Of work, up to the need and beyond.
+        Price of work, up to the need and beyond.
     fixed_penalty, penalty : ndarray, shape (t,)
-        Of a shortfall, and per work that is missing.
+        Penalty of any shortfall, and per missing work.
     """
 
     done: FloatArray
@@ -43,7 +43,7 @@ class Tasks(NamedTuple):
 
 @compiled
 def price_of_work(tasks: Tasks, j: int, done: float, at_most: float) -> float:
-    """Return what work of `done` beyond the need costs, or the penalty where even `at_most` is a shortfall."""
+    """Return the price of the work in `done` beyond the need, or the penalty if even `at_most` is a shortfall."""
     if done > 1.0:
         return float(tasks.price[j] * (done - 1.0))
     return float(tasks.fixed_penalty[j] + tasks.penalty[j] * (1.0 - at_most)) if at_most < 1.0 else 0.0
@@ -51,7 +51,7 @@ def price_of_work(tasks: Tasks, j: int, done: float, at_most: float) -> float:
 
 @compiled
 def sort_options(value: FloatArray, option: WholeArray, regret: FloatArray, second: FloatArray) -> None:
-    """Sort the options of each agent by value, and write the regrets, shape (n, t + 1), and that of the second one."""
+    """Sort the options of each agent by value; write their regrets, shape (n, t + 1), and that of the second one."""
     for i in range(len(value)):
         for z in range(value.shape[1]):
             q = z
@@ -68,7 +68,7 @@ def sort_options(value: FloatArray, option: WholeArray, regret: FloatArray, seco
 def most_to_come(
     weight: FloatArray, option: WholeArray, regret: FloatArray, order: WholeArray, limit: float
 ) -> FloatArray:
-    """Return the work that agents from each position of `order` on can add to each task, shape (n + 1, t)."""
+    """Return the largest work that agents from each position of `order` on can add to each task, shape (n + 1, t)."""
     most = np.zeros((len(order) + 1, weight.shape[1] - 1))
     for q in range(len(order) - 1, -1, -1):
         i = order[q]
@@ -85,21 +85,21 @@ def most_to_come(
 def repartition(
     value: FloatArray, weight: FloatArray, tasks: Tasks, current: WholeArray, max_nodes: int, best: WholeArray
 ) -> float:
-    """Write the best option of each agent, if it is better than the current one, and return by how much it is.
+    """Write the best options of all agents, if they improve on the current ones, and return the gain.
 
     Parameters
     ----------
     value : ndarray, shape (n, t + 1)
-        Cost of an agent on each task less the price of its work there, ``inf`` out of reach; last, if it stays idle.
+        Reduced cost of each agent on each task, ``inf`` out of reach; the last column is for idle agents.
     weight : ndarray, shape (n, t + 1)
-        Its work.
+        Work of each agent on each task.
     tasks : Tasks
     current : ndarray of int, shape (n,)
-        Option of each agent.
+        Current option of each agent.
     max_nodes : int
-        Nodes of the search after which it ends.
+        Limit on the nodes of the search.
     best : ndarray of int, shape (n,)
-        Gets the option of each agent, where there is a gain.
+        Output: the option of each agent, if there is a gain.
     """
     agents, options = value.shape
     option, regret = np.empty((agents, options), dtype=np.int64), np.empty((agents, options))
