@@ -15,7 +15,7 @@ OVERHEAD_S = 0.5
 
 
 def hard(n: int = 150, m: int = 50) -> Instance:
-    """Few agents per task, abilities all different: no solver proves anything here within minutes."""
+    """Return an instance with few agents per task and distinct abilities, which no solver proves within minutes."""
     rng = np.random.default_rng(0)
     return Instance(
         ability=rng.uniform(1, 1000, n),
@@ -27,14 +27,14 @@ def hard(n: int = 150, m: int = 50) -> Instance:
 
 @pytest.fixture(params=["cpsat", "milp"], scope="module")
 def exact(request: pytest.FixtureRequest) -> Allocator:
-    """Each exact method."""
+    """Return each exact method."""
     return load(request.param)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("objective", ["makespan", "makespan-energy"])
 def test_time_limit_is_held_in_both_stages(exact, objective):
-    """A second is a second, with a plan and a bound at its end, and the energy gets its share of it."""
+    """A run of one second ends in time with a plan and a bound, and the energy stage gets its share."""
 
     def run():
         begin = time.monotonic()
@@ -52,7 +52,7 @@ def test_time_limit_is_held_in_both_stages(exact, objective):
 @pytest.mark.slow
 @pytest.mark.parametrize(("objective", "limit_s"), [("makespan", 60.0), ("makespan-energy", 2.0)])
 def test_event_ends_a_run_in_native_code(exact, objective, limit_s):
-    """Setting the event half-way, in the first stage or in the second, ends the run within a second."""
+    """Setting the event in the first or the second stage ends the run within a second."""
     delay = 0.5 if objective == "makespan" else 1.5  # the energy gets the last 0.8 s
 
     def late_s():
@@ -83,8 +83,8 @@ for _ in range(2):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("method", ["cpsat", "milp"])
-def test_signals_end_runs_and_leave_the_process_in_order(method):
-    """The best plan is there soon after either signal, and the process goes on, and ends with status 0."""
+def test_signals_end_runs_but_not_the_process(method):
+    """After either signal, the best plan is returned soon, and the process continues and exits with status 0."""
     code = PROGRAMME.format(folder=__file__.rpartition("/")[0], method=method)
     with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
@@ -99,7 +99,7 @@ def test_signals_end_runs_and_leave_the_process_in_order(method):
 
 
 def test_iterations_count_models_and_repeat(exact):
-    """With a budget of iterations alone, the same seed gives the same answer, after as many models for the solver."""
+    """With a budget of iterations alone, the same seed gives the same answer after the same number of models."""
     instance = hard(14, 4)
     runs = [solve(instance, exact, time_limit_s=None, iterations=3, seed=5) for _ in range(2)]
     assert runs[0].allocation == runs[1].allocation
@@ -108,21 +108,21 @@ def test_iterations_count_models_and_repeat(exact):
 
 
 def test_no_iterations_still_give_a_plan(exact):
-    """Even where the solver may not be asked at all, every task is served."""
+    """Even if the solver may not be called at all, every task is served."""
     result = solve(paper(1, 0), exact, time_limit_s=None, iterations=0)
     assert result.makespan is not None
     assert result.stop_reason is StopReason.ITERATIONS
 
 
 def test_no_time_still_gives_a_plan(exact):
-    """With a time limit of zero every task is served, in no time."""
+    """With a time limit of zero, every task is served at once."""
     result = solve(paper(1, 0), exact, time_limit_s=0)
     assert result.makespan is not None
     assert result.runtime_s < OVERHEAD_S
 
 
-def test_start_is_built_on(exact):
-    """A start that is the optimum is kept, and proven."""
+def test_a_warm_start_is_used(exact):
+    """An optimal start is kept and proven."""
     best = solve(paper(1, 0), exact)
     again = solve(paper(1, 0), exact, start=best.allocation, objective="makespan")
     assert again.allocation == best.allocation
@@ -130,7 +130,7 @@ def test_start_is_built_on(exact):
 
 
 def test_target_gap_ends_the_run(exact):
-    """A gap of 5 % is reached by the first plans and is enough, if asked for."""
+    """A target gap of 5 % is reached by the first plans and ends the run."""
     result = solve(hard(), exact, target_gap=0.05, time_limit_s=30)
     assert result.stop_reason is StopReason.TARGET_GAP
     assert result.gap is not None
@@ -138,7 +138,7 @@ def test_target_gap_ends_the_run(exact):
 
 
 def test_error_of_a_callback_reaches_the_caller(exact):
-    """What `on_improvement` raises comes out of `solve`, even while a solver runs."""
+    """Exceptions of `on_improvement` propagate through `solve`, even while a solver runs."""
 
     def refuse_energy(improvement):
         if len(seen) == 3:
@@ -156,8 +156,8 @@ def test_error_of_a_callback_reaches_the_caller(exact):
         )
 
 
-def test_improvements_are_told_from_the_calling_thread(exact):
-    """Callbacks come from the thread that called `solve`, although the solver runs in another."""
+def test_improvements_are_reported_from_the_calling_thread(exact):
+    """Callbacks are made in the thread that called `solve`, although the solver runs in another."""
     threads = set()
     solve(
         paper(1, 0),
@@ -170,7 +170,7 @@ def test_improvements_are_told_from_the_calling_thread(exact):
 
 
 def test_models_too_large_for_the_time_are_refused(exact):
-    """The reason names the size, and what would be possible in that time; more time is enough."""
+    """The refusal names the size and the largest possible one in that time; with more time it is not refused."""
     instance = hard(1000, 150)
     with pytest.raises(RefusedError, match=r"it takes \d+ pairs of agent class and task within 0.1 s, this has 150000"):
         solve(instance, exact, time_limit_s=0.1)

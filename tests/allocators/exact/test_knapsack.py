@@ -13,13 +13,13 @@ classes = st.lists(st.tuples(st.integers(1, 7), st.integers(-2, 9), st.integers(
 
 
 def arrays(rows):
-    """Weights, prices and copies as the kernels take them."""
+    """Return weights, prices and copies as arrays for compiled code."""
     weight, price, copies = (np.array(column, dtype=np.int64) for column in zip(*rows, strict=True))
     return weight, price / 4, copies
 
 
 def by_states(weight, price, copies, need, cheaper, group, *, size=MAX_STATES, excess=()):
-    """What lists of states find, with space for so many of them."""
+    """Return the result of lists of states with a given capacity."""
     weight, states = weight.astype(float), room_for_states(size)
     return cheapest_by_states(
         weight, price, copies, float(need), cheaper, states, group, np.asarray(excess, dtype=float)
@@ -27,7 +27,7 @@ def by_states(weight, price, copies, need, cheaper, group, *, size=MAX_STATES, e
 
 
 def by_trying(weight, price, copies, need, enough):
-    """Least cost over all groups, one by one."""
+    """Return the least cost by brute force over all groups."""
     groups = np.array(list(product(*(range(most + 1) for most in copies))))
     total = groups @ weight
     good = (total >= need) & (total <= enough)
@@ -36,7 +36,7 @@ def by_trying(weight, price, copies, need, enough):
 
 @given(classes, st.integers(0, 12), st.one_of(st.just(-1), st.integers(0, 6)))
 def test_cheapest_group_is_that_of_brute_force(rows, need, spare):
-    """Cost and group are right, for prices of either sign, with and without a limit on the sum."""
+    """Cost and group are right for prices of either sign, with and without a limit on the sum."""
     weight, price, copies = arrays(rows)
     enough = need + spare if spare >= 0 else -1
     cost, group = cheapest_group(weight, price, copies, need, enough)
@@ -64,14 +64,14 @@ def test_one_table_answers_for_every_need(exact):
 
 
 def test_weights_beyond_the_need_count_as_the_need():
-    """An agent that alone is more than enough meets any need, and no smaller sum exactly."""
+    """An agent that alone exceeds the need meets it, but meets no smaller sum exactly."""
     weight, price, copies = np.array([50, 2]), np.array([1.0, 0.4]), np.array([1, 9])
     assert cheapest_group(weight, price, copies, 10, -1)[0] == 1.0
     assert cheapest_group(weight, price, copies, 10, 10)[0] == 2.0
 
 
-def test_no_group_costs_infinity():
-    """Where all together are too few, or no sum fits, the cost is infinite and nobody is taken."""
+def test_infeasible_needs_cost_infinity():
+    """If all agents are too few, or no sum fits, the cost is infinite and no agent is taken."""
     weight, price, copies = np.array([2]), np.array([1.0]), np.array([3])
     for need, enough in ((7, -1), (3, 3)):
         cost, group = cheapest_group(weight, price, copies, need, enough)
@@ -81,7 +81,7 @@ def test_no_group_costs_infinity():
 
 @given(st.integers(0, 2**32), st.integers(0, 3), st.integers(1, 90))
 def test_core_has_the_cheapest_group(seed, spare, classes):
-    """Leaving only the core open costs nothing, for prices of either sign."""
+    """Optimising only the core loses nothing, for prices of either sign."""
     rng = np.random.default_rng(seed)
     weight, copies = rng.integers(1, 11, classes), rng.integers(1, 4, classes)
     price = rng.normal(0, 1, classes)
@@ -97,7 +97,7 @@ def test_core_has_the_cheapest_group(seed, spare, classes):
 @settings(max_examples=20)
 @given(st.integers(0, 2**32), st.integers(1, 60), st.sampled_from([1, 2**30]))
 def test_states_have_the_cheapest_group(seed, classes, scale):
-    """Lists of states find what the table does, also where numbers are far beyond any table."""
+    """Lists of states agree with the table, also for numbers far beyond any table."""
     rng = np.random.default_rng(seed)
     weight, copies = rng.integers(1, 40, classes), rng.integers(1, 4, classes)
     price = rng.integers(0, 500, classes).astype(float)
@@ -112,8 +112,8 @@ def test_states_have_the_cheapest_group(seed, classes, scale):
 
 
 @given(st.integers(0, 2**32), st.integers(2, 6), st.sampled_from([0.0, CHEAPER]))
-def test_without_room_for_states_the_cost_is_a_bound(seed, size, cheaper):
-    """Where states do not fit, no group is cheaper than the cost returned, and the group is one that meets the need."""
+def test_with_too_few_states_the_cost_is_a_bound(seed, size, cheaper):
+    """If states do not fit, no group is cheaper than the returned cost, and the returned group meets the need."""
     rng = np.random.default_rng(seed)
     weight, price, copies = rng.integers(5, 40, 30), rng.integers(1, 500, 30).astype(float), np.ones(30, dtype=np.int64)
     need, group = int(weight.sum() // 2), np.zeros(30, dtype=np.int64)
@@ -129,7 +129,7 @@ float_classes = st.lists(
 
 @given(float_classes, st.integers(1, 160))
 def test_states_of_reals_have_the_cheapest_group(rows, need):
-    """With weights that are no integers, cost, group and the bounds on the excess agree with all groups written out."""
+    """With non-integer weights, cost, group and bounds on the excess agree with brute force."""
     whole, price, copies, factor = (np.array(column) for column in zip(*rows, strict=True))
     weight, price, copies, need = whole * factor / 40, price / 20, copies.astype(np.int64), need / 40
     group, excess = np.zeros(len(rows), dtype=np.int64), np.zeros(len(rows))

@@ -25,7 +25,7 @@ def meets(demand: Demand, counts: np.ndarray) -> bool:
 
 @pytest.mark.parametrize("seed", SERVED)
 def test_the_optimum_meets_the_demand_at_its_makespan_and_not_before(seed):
-    """A plan meets the demand at T if and only if the evaluator gives it a makespan of at most T."""
+    """A plan meets the demand at T if and only if its makespan by the evaluator is at most T."""
     instance = tiny_instance(seed)
     plan = Allocation(brute_force(instance).plan)
     makespan = evaluate(instance, plan).makespan
@@ -38,7 +38,7 @@ def test_the_optimum_meets_the_demand_at_its_makespan_and_not_before(seed):
 
 @pytest.mark.parametrize("seed", SERVED)
 def test_rounding_keeps_every_plan(seed):
-    """What meets the demand meets it in CP-SAT's integers too, with no sum near 2^63."""
+    """Plans that meet the demand also meet it in CP-SAT's integers, with no sum near 2^63."""
     instance = tiny_instance(seed)
     best = brute_force(instance)
     model = model_of(instance)
@@ -55,20 +55,20 @@ def test_rounding_keeps_every_plan(seed):
     [([2, 4, 6], 2.0), ([0.5, 1.25], 0.25), ([0.1, 0.2, 0.3], 0.1), ([1, np.pi], None), ([1e9, 1e9 + 0.001], None)],
 )
 def test_unit_of_abilities_is_found(ability, unit):
-    """Integers and short decimals have a common unit, other numbers and those with too many digits have none."""
+    """Integers and short decimals have a common unit; other numbers, and those with too many digits, have none."""
     found = model_of(Instance(ability=ability, workload=[1])).unit
     assert found is None if unit is None else found == pytest.approx(unit, rel=1e-12)
 
 
-def test_next_makespan_after_one_that_is_ruled_out():
+def test_next_makespan_after_an_excluded_one():
     """With whole abilities and a workload of 12, nothing lies between 12 / 5 and 12 / 4."""
     model = model_of(Instance(ability=[1, 2, 3], workload=[12]))
     assert model.next_makespan(12 / 5) == pytest.approx(3.0, rel=1e-9)
     assert model.next_makespan(2.7) == pytest.approx(3.0, rel=1e-9)
 
 
-def test_travel_takes_from_the_weight():
-    """An agent that arrives after half of the time does half of the work; one that comes too late is of no use."""
+def test_travel_reduces_the_weight():
+    """An agent that arrives after half of the time does half of the work; one that arrives too late is of no use."""
     instance = Instance(
         ability=[1, 1, 1],
         workload=[4],
@@ -79,30 +79,30 @@ def test_travel_takes_from_the_weight():
     assert sorted(model_of(instance).at(4.0).weight.tolist()) == [0.5, 1.0]
 
 
-def test_nothing_to_spare_means_everybody_works():
-    """Where demand uses up all ability, all must work and no task may get more."""
+def test_without_spare_ability_all_agents_work():
+    """If the demand takes all ability, all agents must work, and no task may get more than its need."""
     demand = model_of(Instance(ability=[1, 1, 2], workload=[2, 2])).at(1.0)
     assert demand.spare == 0
     assert demand.max_weight.tolist() == [2, 2]
     assert demand.min_agents.tolist() == demand.count.tolist()
 
 
-def test_agents_that_reach_nothing_are_not_to_spare():
-    """The strongest agent may take no task: it counts neither as ability nor as one who must work."""
+def test_agents_that_reach_nothing_are_not_counted():
+    """The strongest agent may take no task: it counts neither as ability nor as an agent that must work."""
     demand = model_of(Instance(ability=[5, 1, 1], workload=[1, 1], allowed_tasks=[[], None, None])).at(1.0)
     assert demand.spare == 0
     assert demand.min_agents.tolist() == [2, 0]
 
 
-def test_too_small_a_time_is_hopeless():
-    """Below the lower bound, no solver needs to be asked."""
+def test_times_below_the_lower_bound_are_trivially_infeasible():
+    """Below the lower bound, no solver needs to be called."""
     model = model_of(Instance(ability=[1, 1, 2], workload=[2, 2]))
     assert model.at(0.9).trivially_infeasible
     assert not model.at(1.0).trivially_infeasible
 
 
 def test_costs_are_rounded_down():
-    """A bound in CP-SAT's integers bounds the true cost, and loses less than 1e-9 of it."""
+    """A bound in CP-SAT's integers is a bound on the true cost, and loses less than 1e-9 of it."""
     demand = model_of(Instance(ability=[1, 2, 3], workload=[3, 3])).at(1.0)
     pairs, rng = len(demand.class_of_pair), np.random.default_rng(0)
     cost, hint = rng.random(pairs), np.ones(pairs, dtype=np.intp)

@@ -10,12 +10,12 @@ from alloc.problems.generate import paper, paper_like
 
 @pytest.fixture(params=["cpsat", "milp"], scope="module")
 def exact(request: pytest.FixtureRequest) -> Allocator:
-    """Each exact method."""
+    """Return each exact method."""
     return load(request.param)
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
-    """Compare 60 tiny instances, each with one of the objectives; with --draws that many, with both."""
+    """Use 60 tiny instances, each with one of the objectives; with --draws, that many with both."""
     if "objective" in metafunc.fixturenames:
         draws = metafunc.config.getoption("--draws")
         cases = [
@@ -28,7 +28,7 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
 
 
 def test_answer_is_that_of_brute_force(exact, seed, objective):
-    """On tiny instances of every sort the answer is the optimum, or the best partial plan, and is known to be."""
+    """On tiny instances of every kind, the answer is optimal, or the best partial plan, and proven."""
     instance = tiny_instance(seed)
     best = brute_force(instance)
     result = solve(instance, exact, objective=objective, time_limit_s=60)
@@ -50,7 +50,7 @@ def test_paper_scenarios_are_proven(exact, scenario):
 
 @pytest.mark.parametrize("name", ["cpsat", "milp"])
 def test_solver_alone_proves_a_paper_scenario(name):
-    """Without the descent it is the solver that has to find the plan of T = 1, and does."""
+    """Without the descent, the solver finds the plan with T = 1."""
     exact = type(load(name))(descent=False)
     result = solve(paper(1, 3), exact, time_limit_s=30)
     assert (result.status, result.makespan) == (Status.OPTIMAL, 1.0)
@@ -58,8 +58,8 @@ def test_solver_alone_proves_a_paper_scenario(name):
 
 
 @pytest.mark.parametrize("slack", [0.1, 0.5, 3.0])
-def test_slack_is_spent_to_the_end(exact, slack):
-    """The least energy of all plans at most so much slower than the fastest, as trying everything finds it."""
+def test_makespan_slack_is_fully_used(exact, slack):
+    """The energy is the least of all plans within the slack, as found by brute force."""
     instance = paper_like(6, 3, 24, 4)
     able = least_energy_within(instance, brute_force(instance).makespan * (1 + slack))
     result = solve(instance, exact, objective="makespan-energy", makespan_slack=slack, time_limit_s=60)
@@ -67,8 +67,8 @@ def test_slack_is_spent_to_the_end(exact, slack):
     assert result.energy == pytest.approx(able, rel=1e-6)
 
 
-def test_limit_is_spent_to_the_end(exact):
-    """A makespan limit that can be kept leaves the energy alone to be minimised; one that cannot changes nothing."""
+def test_makespan_limit_is_fully_used(exact):
+    """With a feasible makespan limit, only the energy is minimised; an infeasible one changes nothing."""
     instance = paper_like(6, 3, 24, 4)
     best = brute_force(instance)
     result = solve(instance, exact, objective="makespan-energy", makespan_limit=2.5 * best.makespan, time_limit_s=60)
@@ -79,8 +79,8 @@ def test_limit_is_spent_to_the_end(exact):
     assert (strict.makespan, strict.energy) == pytest.approx((best.makespan, best.energy), rel=1e-6)
 
 
-def test_makespans_a_millionth_apart_are_told_apart(exact):
-    """Two splits that differ by 1.5e-6 relative: the better one is found."""
+def test_makespans_a_millionth_apart_are_distinguished(exact):
+    """Of two splits that differ by 1.5e-6 relative, the better one is found."""
     instance = Instance(ability=[1.0, 1.0000015, 0.5, 0.4999985], workload=[1.5, 1.5])
     result = solve(instance, exact, time_limit_s=30)
     best = brute_force(instance)
@@ -90,7 +90,7 @@ def test_makespans_a_millionth_apart_are_told_apart(exact):
 
 @pytest.mark.parametrize("scale", [1e-9, 1e9])
 def test_units_do_not_matter(exact, scale):
-    """Workloads in units a milliard times as large or small give the same plan, in other hours."""
+    """Workloads in units a billion times as large or small give the same plan, with scaled hours."""
     rng = np.random.default_rng(5)
     ability, workload = rng.uniform(1, 3, 6), rng.uniform(1, 5, 2)
     plain = solve(Instance(ability=ability, workload=workload), exact, time_limit_s=30)
@@ -101,7 +101,7 @@ def test_units_do_not_matter(exact, scale):
 
 
 def test_contest_is_explained(exact):
-    """One agent for three tasks: two of them, already one too many, are named in plain words."""
+    """With one agent for three tasks, two of them, already one too many, are named in plain words."""
     instance = Instance(ability=[1, 1], workload=[1, 1, 1, 1], allowed_tasks=[[0, 1, 2], [3]])
     result = solve(instance, exact)
     assert result.status is Status.INFEASIBLE
@@ -109,8 +109,8 @@ def test_contest_is_explained(exact):
     assert any("only 1 agent can take any of the 2 tasks" in note for note in result.notes)
 
 
-def test_nothing_to_do_needs_nobody(exact):
-    """Where no task has workload, everybody is idle, at once."""
+def test_without_workload_all_agents_are_idle(exact):
+    """If no task has workload, the idle plan is returned at once."""
     instance = Instance(
         ability=[1, 2], workload=[0, 0], agent_position=[[0, 0], [1, 1]], task_position=[[2, 2], [3, 3]]
     )
@@ -119,7 +119,7 @@ def test_nothing_to_do_needs_nobody(exact):
 
 
 def test_solvers_share_a_process():
-    """OR-Tools and HiGHS answer in turn in one process."""
+    """OR-Tools and HiGHS can be called alternately in one process."""
     instance = tiny_instance(3)
     answers = [solve(instance, name).evaluation.served_makespan for name in ("cpsat", "milp", "cpsat", "milp")]
     assert answers == pytest.approx([answers[0]] * 4, rel=1e-6)

@@ -1,4 +1,4 @@
-"""The plain model, given to the solvers without our own stages."""
+"""The plain model, solved by the solvers alone."""
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ from alloc.problems.models.programme import build_programme
 @pytest.mark.parametrize("name", ["milp", "cpsat"])
 @pytest.mark.parametrize("seed", range(6))
 def test_answer_is_that_of_brute_force(name, seed):
-    """The solver alone proves the least makespan, then the least energy at it, whatever the abilities are."""
+    """The solver alone proves the least makespan, then the least energy at it, for any abilities."""
     instance = tiny_instance(seed)
     if instance.has_travel_time:
         instance = Instance(ability=instance.ability, workload=instance.workload)
@@ -40,7 +40,7 @@ def test_time_limit_ends_the_solver(name):
 
 
 def test_a_solver_stopped_at_once_proves_nothing():
-    """CP-SAT's bound is 0 before it has one: that is no proof that tasks take for ever."""
+    """CP-SAT's initial bound of 0 is not taken as a proof of infeasibility."""
     instance = paper_like(100, 20, 400, seed=1)
     programme = build_programme(instance, by_class=False, objective=Objective.MAKESPAN)
     limits = SolverLimits(threads=1, seed=0, seconds=1e-3, repeatable=False)
@@ -48,7 +48,7 @@ def test_a_solver_stopped_at_once_proves_nothing():
     assert (answer.pairs, answer.bound) == (None, None)
 
 
-def test_what_it_cannot_state_is_refused():
+def test_instances_without_a_plain_model_are_refused():
     """Finite speeds, and more pairs than fit a model, are refused beforehand."""
     with pytest.raises(RefusedError, match="finite speeds"):
         solve(Instance(ability=[1.0], workload=[1.0], speed=[1.0]), Milp(plain=True))

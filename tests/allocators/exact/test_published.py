@@ -1,4 +1,4 @@
-"""The published table of machine covering says what its plans are worth, and bounds that they meet."""
+"""The published results on machine covering are consistent: values of plans, and bounds."""
 
 import csv
 from pathlib import Path
@@ -22,7 +22,7 @@ def rows() -> list[dict[str, str]]:
 
 
 def test_every_plan_has_the_published_makespan_and_no_bound_is_above_it() -> None:
-    """Scored anew, every plan serves all tasks in the published time, at or above the published and simple bounds."""
+    """Evaluated again, every plan serves all tasks in the published time, not below the published and simple bounds."""
     for row in rows():
         shape = (int(row[name]) for name in ("agents", "tasks", "low", "high", "seed"))
         instance = machine_covering(*shape, equal=row["workloads"] == "equal")
@@ -40,7 +40,7 @@ def test_every_plan_has_the_published_makespan_and_no_bound_is_above_it() -> Non
 
 
 def test_least_loads_are_those_of_the_makespans() -> None:
-    """With equal workloads the optimum's least load is a whole number, and the bound on it is the same number."""
+    """With equal workloads, the optimum's least load is an integer, and so is the bound on it, the same number."""
     for row in rows():
         if row["workloads"] == "equal":
             load = 1000 / float(row["makespan"])

@@ -1,4 +1,4 @@
-"""Optima and bounds hold in whatever units distances, workloads and abilities come."""
+"""Optima and bounds are valid in any units of distances, workloads and abilities."""
 
 import numpy as np
 import pytest
@@ -31,7 +31,7 @@ SERVED = [seed for seed in range(40) if fewest_unserved(scaled_instance(seed)) =
     "seed", [pytest.param(one, marks=[pytest.mark.slow] * (k >= 6)) for k, one in enumerate(SERVED[:20])]
 )
 def test_optima_and_bounds_are_those_of_brute_force(seed, method):
-    """What is called optimal is so, and no bound exceeds what some plan reaches."""
+    """Plans reported as optimal are optimal, and no bound exceeds the value of a plan."""
     instance = scaled_instance(seed)
     result = solve(instance, method, objective="makespan-energy", time_limit_s=60)
     assert result.status is Status.OPTIMAL
@@ -56,7 +56,7 @@ def test_bounds_without_a_solver_for_integers_hold(seed):
 @pytest.mark.parametrize("method", ["milp", "cpsat", "auto"])
 @pytest.mark.parametrize("unit", [1e-9, 1e-7, 1.0, 1e9])
 def test_least_energy_by_hand(method, unit):
-    """Four units of the way are least, five are not, however small the unit."""
+    """The least energy is four units of distance, not five, however small the unit."""
     instance = Instance(
         ability=[2, 1, 3],
         workload=[2, 2],
@@ -79,7 +79,7 @@ def test_least_energy_by_hand(method, unit):
     ids=["in time", "in iterations"],
 )
 def test_larger_instances_are_proven_in_any_unit(method, unit, plain, budget):
-    """Where both sides of the gap come before the solver, the least energy is the same number of units too."""
+    """If plans and bounds are sought before the solver, the least energy is the same number of units as well."""
     scaled = Instance(
         ability=plain.ability,
         workload=plain.workload,
@@ -96,7 +96,7 @@ def test_larger_instances_are_proven_in_any_unit(method, unit, plain, budget):
 @pytest.mark.parametrize("small", [1e-13, 1e-11, 1e-10, 9e-10, 1.1e-9, 1e-8])
 @pytest.mark.parametrize("speed", [np.inf, 1e3])
 def test_equal_makespans_cost_the_least_energy_of_all(method, small, speed):
-    """An agent that saves less than the tolerance stays at home; one that saves more is sent: all methods agree."""
+    """An agent that saves less than the tolerance stays idle, one that saves more is sent: all methods agree."""
     instance = Instance(
         ability=[1, small], workload=[1], agent_position=[[0, 0], [5, 0]], task_position=[[0, 0]], speed=[speed] * 2
     )
@@ -108,7 +108,7 @@ def test_equal_makespans_cost_the_least_energy_of_all(method, small, speed):
 
 
 def energy_model(cost: np.ndarray, hint: np.ndarray | None) -> SolverModel:
-    """Minimise the cost over one class of agents for each pair."""
+    """Return a model that minimises the cost, with a class of agents for each pair."""
     instance = Instance(ability=np.arange(1.0, 1 + len(cost)), workload=[1.0])
     demand: Demand = Model.build(instance, agent_classes(instance, by_place=False), 1).at(1.0)
     return SolverModel(demand, cost, hint, SolverLimits(seconds=1, threads=1, seed=0, repeatable=False))
@@ -117,7 +117,7 @@ def energy_model(cost: np.ndarray, hint: np.ndarray | None) -> SolverModel:
 @pytest.mark.parametrize("unit", [1e-280, 1e-9, 1e-3, 1.0, 1e9, 1e280])
 @pytest.mark.parametrize("dear", [1.0, 1e9])
 def test_costs_come_to_solvers_at_about_one(unit, dear):
-    """Whatever the unit, and however dear what no plan needs, the plan at hand keeps its cost; nothing overflows."""
+    """For any unit, and any cost of pairs that no plan needs, the incumbent keeps its cost, and nothing overflows."""
     cost, hint = np.array([3.0, 1.0, 2.0 * dear]) * unit, np.array([1, 1, 0])
     scaled, scale = scaled_costs(energy_model(cost, hint))
     assert np.log2(scale) == round(np.log2(scale))
@@ -130,7 +130,7 @@ def test_costs_come_to_solvers_at_about_one(unit, dear):
 
 
 def test_ordinary_costs_are_left_as_they_are():
-    """Costs of an ordinary order reach the solver to the bit."""
+    """Costs of ordinary magnitude are passed to the solver unchanged."""
     cost = np.random.default_rng(0).random(5)
     scaled, scale = scaled_costs(energy_model(cost, np.ones(5, dtype=np.intp)))
     assert scale == 1.0

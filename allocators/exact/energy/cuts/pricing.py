@@ -14,7 +14,7 @@ from alloc.allocators.runtime.compiled import compiled
 from alloc.problems.instance import FloatArray
 
 MAX_NODES = 20_000
-"""Limit on the nodes of the search for one group, which then returns the bound of the open nodes."""
+"""Nodes of the search for one group after which it ends with the bound of the nodes still open."""
 
 STEPS, MOST_STEPS, CELLS = 1000, 10_000, 200_000
 """Minimum and maximum number of steps of a need for non-integer weights, and the target number of table cells."""

@@ -23,7 +23,7 @@ LINE = np.abs(np.subtract.outer(np.arange(4.0), np.arange(4.0)))
 
 @cache
 def model_of(seed: int, tasks: int, *, limited: bool) -> tuple[EnergyModel, float, np.ndarray]:
-    """A model of six agents that all differ, the cost of its best plan, and that plan; the last task is idleness."""
+    """Return a model of six different agents, the cost of its best plan, and that plan; the last task is idleness."""
     rng = np.random.default_rng(seed)
     ability = rng.integers(1, 6, 6)
     start = rng.permutation(np.append(np.arange(tasks), rng.integers(0, tasks + (not limited), 6 - tasks)))
@@ -57,7 +57,7 @@ def model_of(seed: int, tasks: int, *, limited: bool) -> tuple[EnergyModel, floa
 @pytest.mark.parametrize("limited", [False, True])
 @pytest.mark.parametrize("seed", range(4))
 def test_bound_is_below_the_best_plan_and_its_pairs_are_kept(seed, limited, worse, monkeypatch):
-    """However long prices move towards the cost of a worse plan, the best one bounds the bound and loses no pair."""
+    """However long prices aim at the cost of a worse plan, the bound is below the best plan, which loses no pair."""
     monkeypatch.setattr(lagrangian, "is_small", lambda model: False)  # small models have no prices of clusters
     model, best, plan = model_of(seed, 4, limited=limited)
     bound = LagrangianBound(model, LINE, np.zeros(len(model.count)))
@@ -69,8 +69,8 @@ def test_bound_is_below_the_best_plan_and_its_pairs_are_kept(seed, limited, wors
 
 @pytest.mark.parametrize("limited", [False, True])
 @pytest.mark.parametrize("seed", range(8))
-def test_excess_is_what_a_pair_costs_more(seed, limited):
-    """The best group with an agent of the pair, of all groups written out, is dearer by no less than the excess."""
+def test_excess_is_a_lower_bound_on_the_extra_cost_of_a_pair(seed, limited):
+    """The best group with an agent of the pair, of all enumerated groups, costs more by at least the excess."""
     model, _, _ = model_of(seed, 2, limited=limited)
     group, excess, total = solve_subproblems(model, model.cost)
     assert total == pytest.approx(float(group @ model.cost))
@@ -90,7 +90,7 @@ def test_excess_is_what_a_pair_costs_more(seed, limited):
 @pytest.mark.parametrize("kind", ["whole", "limited", "real"])
 @pytest.mark.parametrize("seed", range(8))
 def test_bound_by_cutting_planes_is_below_the_best_plan(seed, kind, worse):
-    """Until no cut is violated any more, the best plan of all bounds the bound, and loses no pair."""
+    """Until no cut is violated any more, the bound is below the best plan, which loses no pair."""
     model, best, plan = model_of(seed, 4, limited=kind == "limited")
     if kind == "real":
         part, need = model.weight / model.need[model.task_of_pair], np.full(len(model.need), 1 - 1e-10)
@@ -110,7 +110,7 @@ def test_bound_by_cutting_planes_is_below_the_best_plan(seed, kind, worse):
 @pytest.mark.parametrize("limited", [False, True])
 @pytest.mark.parametrize("seed", range(6))
 def test_the_best_of_all_groups_is_the_best_plan(seed, limited, worse):
-    """Groups of plans that cost less than a worse one are those of the best plan, too; none are cheaper than it."""
+    """The groups of all plans cheaper than a given one contain the best plan, and none cheaper."""
     model, best, plan = model_of(seed, 4, limited=limited)
     group = (model.task_of_pair == plan[model.class_of_pair]).astype(np.int64)
     cuts = CuttingPlanes(model, overlapping_clusters(LINE, 100), np.zeros(len(model.count)), [group])
@@ -127,7 +127,7 @@ def test_the_best_of_all_groups_is_the_best_plan(seed, limited, worse):
 
 
 def has_float_weights(instance):
-    """Whether weights are no whole numbers, and there are flights that cost something."""
+    """Return whether weights are not integers, and some flights have a cost."""
     model = Model.build(instance, agent_classes(instance, by_place=True), instance.m)
     return all_can_be_served(instance) and model.unit is None and model.cost.any()
 

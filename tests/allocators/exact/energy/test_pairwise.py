@@ -9,8 +9,8 @@ from alloc.allocators.exact.energy.pairwise_search import PairwiseSearch
 
 @pytest.mark.parametrize("partner", ["task", "idleness"])
 @pytest.mark.parametrize("seed", range(10))
-def test_repartition_of_a_pair_is_the_best_there_is(seed, partner):
-    """Of all ways to assign seven agents to a task and another, or to idleness, none is cheaper and does both."""
+def test_repartition_of_a_pair_is_optimal(seed, partner):
+    """No assignment of seven agents to two tasks, or a task and idleness, that meets the needs is cheaper."""
     rng = np.random.default_rng(seed)
     weight, task = rng.integers(1, 6, 7), np.append([0, 1], rng.integers(0, 2, 5))
     task = np.where(task == 1, 1 if partner == "task" else 2, 0)
@@ -32,7 +32,7 @@ def test_repartition_of_a_pair_is_the_best_there_is(seed, partner):
 
 
 def test_search_keeps_needs_and_never_loses_its_best_plan():
-    """Descent and annealing give plans that do every task, at a distance that never grows."""
+    """Descent and annealing yield plans that do every task, with a best distance that never increases."""
     rng = np.random.default_rng(0)
     weight, task = rng.integers(1, 9, 30), np.arange(30) % 6
     need = np.bincount(task, weight, 6).astype(np.int64) - 2
@@ -51,7 +51,7 @@ def test_search_keeps_needs_and_never_loses_its_best_plan():
 
 
 def search_of(seed: int) -> tuple[PairwiseSearch, np.ndarray, np.ndarray]:
-    """A search with 30 agents and six tasks, their distances, and the plan that it begins with."""
+    """Return a search with 30 agents and six tasks, their distances, and its initial plan."""
     rng = np.random.default_rng(seed)
     weight, task, distance = rng.integers(1, 9, 30), np.arange(30) % 6, rng.random((30, 6))
     need = np.bincount(task, weight, 6).astype(np.int64) - 2
@@ -59,7 +59,7 @@ def search_of(seed: int) -> tuple[PairwiseSearch, np.ndarray, np.ndarray]:
 
 
 def test_search_sends_agents_only_where_they_are_allowed():
-    """Or where they are, which may be far from the best."""
+    """Or where they already are, which may be far from the best."""
     search, _, task = search_of(2)
     allowed = np.random.default_rng(0).random((30, 6)) < 0.4
     search.restrict(allowed)
@@ -71,7 +71,7 @@ def test_search_sends_agents_only_where_they_are_allowed():
 
 
 def test_search_goes_on_from_a_better_plan_that_meets_all_needs():
-    """Another search's plan is taken over, even where this one may not go; one that leaves a task undone is not."""
+    """Another search's plan is adopted, even on pairs not allowed here; one that leaves a task undone is not."""
     (search, _, task), (other, *_) = search_of(2), search_of(2)
     search.restrict(np.zeros((30, 6), dtype=bool))
     for step in range(5):

@@ -8,8 +8,8 @@ from alloc.allocators.exact.model import Model
 from alloc.problems import IDLE, Allocation, Instance, agent_classes, evaluate
 
 
-def test_agents_alike_change_places():
-    """Two agents of the same ability that were sent past each other stay at home instead."""
+def test_identical_agents_are_exchanged():
+    """Two agents of the same ability that were sent past each other each take the near task instead."""
     instance = Instance(
         ability=[1, 1], workload=[1, 1], agent_position=[[0, 0], [1, 0]], task_position=[[0, 0], [1, 0]]
     )
@@ -17,7 +17,7 @@ def test_agents_alike_change_places():
 
 
 def test_an_idle_agent_that_is_nearer_takes_over():
-    """Idle agents of the class count too."""
+    """Idle agents of the class take part in the exchange."""
     instance = Instance(ability=[1, 1], workload=[1], agent_position=[[5, 0], [1, 0]], task_position=[[0, 0]])
     assert nearest_places(instance, Allocation([0, IDLE])) == Allocation([IDLE, 0])
 
@@ -34,8 +34,8 @@ def test_changing_places_keeps_the_makespan(seed):
 
 
 @pytest.mark.parametrize("size", [401, 950])
-def test_large_classes_are_matched_in_parts(size):
-    """Nobody is lost or doubled where a class is cut into parts."""
+def test_large_classes_are_split(size):
+    """No agent is lost or duplicated if a class is split."""
     rng = np.random.default_rng(0)
     instance = Instance(
         ability=np.ones(size),
@@ -49,8 +49,8 @@ def test_large_classes_are_matched_in_parts(size):
     assert evaluate(instance, found).energy < evaluate(instance, plan).energy
 
 
-def test_agents_without_whom_all_is_in_time_stay_at_home():
-    """A task of two hours' work with four agents on it, two hours to go: the nearest one does."""
+def test_unneeded_agents_become_idle():
+    """Of four agents on a task of two hours' work with two hours left, only the nearest one is kept."""
     instance = Instance(
         ability=[1, 1, 1, 1],
         workload=[2, 2],

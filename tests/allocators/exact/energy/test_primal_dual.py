@@ -10,13 +10,13 @@ from alloc.problems.generate import paper_like
 
 
 def primal_dual(instance: Instance, plan: Allocation, makespan: float, seed: int = 0) -> PrimalDual:
-    """Both sides at a plan and a makespan that it holds."""
+    """Return both sides for a plan and a makespan that it meets."""
     model = Model.build(instance, agent_classes(instance, by_place=True), int((instance.workload > 0).sum()))
     return PrimalDual(instance, model, model.at(makespan), plan, seed, 10.0)
 
 
 def narrowed(sides: PrimalDual, instance: Instance, plan: Allocation) -> Allocation:
-    """Work on both sides to the end."""
+    """Run both sides to the end."""
     for number in range(REPEATABLE_SLICES):
         plan = sides.repeat(number) or plan
         sides.note_plan(plan, evaluate(instance, plan).distance)
@@ -24,7 +24,7 @@ def narrowed(sides: PrimalDual, instance: Instance, plan: Allocation) -> Allocat
 
 
 def at_home(agents: int, tasks: int, seed: int) -> tuple[Instance, Allocation]:
-    """An instance of the paper's kind with a plan of T = 1 that lies far from the best."""
+    """Return an instance like the paper's, with a plan for T = 1 far from the least energy."""
     rng = np.random.default_rng(seed)
     plan = np.concatenate([np.arange(tasks), rng.integers(0, tasks, agents - tasks)])
     ability = rng.integers(1, 11, agents)
@@ -40,7 +40,7 @@ def at_home(agents: int, tasks: int, seed: int) -> tuple[Instance, Allocation]:
 
 @pytest.mark.parametrize("seed", seeds_where(all_can_be_served, 30))
 def test_bound_is_below_the_optimum_of_brute_force(seed):
-    """On tiny instances of every sort the bound holds, and the plans found are what they claim to be."""
+    """On tiny instances of every kind, the bound is valid, and plans have the reported cost."""
     instance = tiny_instance(seed)
     best = brute_force(instance)
     assert not best.unserved
@@ -52,7 +52,7 @@ def test_bound_is_below_the_optimum_of_brute_force(seed):
 
 @pytest.mark.parametrize("slack", [1.0, 1.3])
 def test_bound_and_plan_meet_or_come_close(slack):
-    """On an instance of the paper's kind, with T = 1 or more, both sides come within some percent of each other."""
+    """On an instance like the paper's, for T >= 1, the gap is closed to some percent."""
     instance, plan = at_home(40, 8, 1)
     sides = primal_dual(instance, plan, slack)
     before = evaluate(instance, plan)
@@ -65,7 +65,7 @@ def test_bound_and_plan_meet_or_come_close(slack):
 
 
 def test_pairs_of_the_best_plan_are_kept():
-    """What is left for the solver has the plan at hand in it, and far fewer pairs."""
+    """The pairs left for the solver contain the incumbent plan, and are far fewer."""
     instance, plan = at_home(60, 10, 2)
     model = Model.build(instance, agent_classes(instance, by_place=True), instance.m)
     demand = model.at(1.0)
@@ -77,7 +77,7 @@ def test_pairs_of_the_best_plan_are_kept():
 
 
 def test_same_seed_same_plans():
-    """Work counted in rounds gives the same plans and bounds again."""
+    """With effort counted in rounds, plans and bounds are reproducible."""
     instance = paper_like(60, 10, 240, 0)
     plan = Allocation(np.arange(60) % 10)
     limit = evaluate(instance, plan).served_makespan
@@ -91,7 +91,7 @@ def test_same_seed_same_plans():
 
 
 def test_limits_of_reach_are_kept():
-    """Agents are shared out only among tasks that they can take."""
+    """Agents are assigned only to tasks that they can take."""
     rng = np.random.default_rng(3)
     places = rng.random((6, 2))
     plan = np.arange(30) % 6

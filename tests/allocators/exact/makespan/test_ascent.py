@@ -15,7 +15,7 @@ SERVED = [
 
 
 def ascent_on(instance: Instance, price: np.ndarray | None = None) -> tuple[ConfigurationAscent, float]:
-    """Return the ascent from the bound by fractions of agents, and that bound; from other prices where given."""
+    """Return the ascent from the bound by fractional agents, and that bound; from given prices if any."""
     model = Model.build(instance, agent_classes(instance, by_place=False), int((instance.workload > 0).sum()))
     low, found = relaxed_lower_bound(model, makespan_lower_bound(instance), 1e9, 10.0, lambda: False)
     assert found is not None
@@ -24,7 +24,7 @@ def ascent_on(instance: Instance, price: np.ndarray | None = None) -> tuple[Conf
 
 @pytest.mark.parametrize("seed", SERVED)
 def test_bound_holds_at_any_prices(seed):
-    """However far prices move, and wherever they begin, nothing up to the optimum's makespan is called impossible."""
+    """From any initial prices, after any number of rounds, no makespan from the optimum on is excluded."""
     instance, rng = tiny_instance(seed), np.random.default_rng(seed)
     best = brute_force(instance).makespan
     for price in (None, rng.exponential(size=instance.m)):
@@ -34,8 +34,8 @@ def test_bound_holds_at_any_prices(seed):
         assert ascent.proven < best * (1 + 1e-9)
 
 
-def test_whole_agents_are_seen():
-    """Three agents that arrive after an hour, for two tasks of three hours' work: fractions say 3, whole agents 4."""
+def test_integrality_raises_the_bound():
+    """Three agents arrive after an hour at two tasks of three hours' work: the bound is 4, or 3 if fractional."""
     instance = Instance(
         ability=[1, 1, 1],
         workload=[3, 3],
@@ -50,7 +50,7 @@ def test_whole_agents_are_seen():
     assert 3.97 < ascent.proven < 4.0
 
 
-def test_tasks_that_are_nothing_to_an_agent():
-    """What an agent brings may be any multiple of what a task needs: it is cut off before it is counted in steps."""
+def test_tasks_that_are_tiny_for_an_agent():
+    """An agent's work may be any multiple of a task's need: it is capped before it is rounded to steps."""
     instance = Instance(ability=[2.8, 3.4, 10.0], workload=[1e-60, 0.0, 1e-9], speed=[np.inf, np.inf, 3.0])
     assert solve(instance, "cpsat", iterations=2, time_limit_s=None).makespan > 0

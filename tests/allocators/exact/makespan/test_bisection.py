@@ -1,4 +1,4 @@
-"""The makespan stage, with a solver whose verdicts are given."""
+"""The makespan stage, with a solver stub."""
 
 from dataclasses import replace
 
@@ -19,7 +19,7 @@ from alloc.problems import Allocation, Instance, Objective, agent_classes
 
 
 class ScriptedSolver:
-    """Knows the best plan: finds it where it is in time, else proves that there is none; or says nothing at all."""
+    """Knows the best plan: returns it if it meets T, and otherwise a proof; or never has a verdict."""
 
     max_pairs = 1_000
     pairs_per_second = 1_000_000
@@ -64,7 +64,7 @@ def test_bisection_alone_closes_the_gap(seed):
 
 @pytest.mark.parametrize("seed", range(3))
 def test_probes_without_verdict_prove_nothing(seed):
-    """A solver that says nothing ends the bisection, and leaves the bound where it was."""
+    """A solver without verdicts ends the bisection, and does not change the bound."""
     instance = instance_of(seed)
     search, solver = search_on(instance), ScriptedSolver(instance, silent=True)
     state = MakespanState.begin(search, instance.m, np.inf, descent=False)
@@ -76,7 +76,7 @@ def test_probes_without_verdict_prove_nothing(seed):
 
 
 def test_probe_gives_the_solvers_verdict():
-    """Above the optimum there is a plan, below it a proof; a T below the bound needs no solver."""
+    """Above the optimum there is a plan, below it a proof; for a T below the bound, the solver is not called."""
     instance = instance_of(0)
     search, solver = search_on(instance), ScriptedSolver(instance)
     state, best = MakespanState.begin(search, instance.m, np.inf, descent=False), brute_force(instance).makespan
@@ -92,8 +92,8 @@ def test_probe_gives_the_solvers_verdict():
 
 @pytest.mark.parametrize("patience", [1.0, np.inf])
 @pytest.mark.parametrize("is_whole", [False, True])
-def test_patience_ends_where_abilities_have_no_unit(monkeypatch, is_whole, patience):
-    """After as long again as it took to find the fastest plan; where there is a unit, a proof may come."""
+def test_patience_is_limited_if_abilities_have_no_unit(monkeypatch, is_whole, patience):
+    """The stage ends after as long again as the fastest plan took; with a unit, a proof may come at any time."""
     drawn = instance_of(0)
     instance = Instance(ability=np.round(drawn.ability), workload=drawn.workload) if is_whole else drawn
     search = search_on(instance)

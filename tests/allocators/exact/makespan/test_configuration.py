@@ -20,8 +20,8 @@ def never() -> bool:
 
 
 @pytest.mark.parametrize("seed", seeds_where(all_can_be_served, 40))
-def test_no_makespan_that_can_be_had_is_ruled_out(seed):
-    """On tiny instances of every sort, no prices exclude the optimum of brute force."""
+def test_no_feasible_makespan_is_excluded(seed):
+    """On tiny instances of every kind, no prices exclude the optimum of brute force."""
     instance = tiny_instance(seed)
     best = brute_force(instance)
     assert not best.unserved
@@ -36,8 +36,8 @@ def test_no_makespan_that_can_be_had_is_ruled_out(seed):
             assert configurations.largest_infeasible(prices, time, 2 * best.makespan) < best.makespan * (1 + 1e-9)
 
 
-def test_needs_are_what_the_loops_are_compiled_for():
-    """Weights lie contiguously, where a column of a table would have the loops compiled anew in the run."""
+def test_needs_have_the_types_for_which_loops_are_compiled():
+    """Weights are contiguous; a column of a table would cause a recompilation within a run."""
     instance = Instance(ability=[3, 5, 6, 7], workload=[10, 14], allowed_tasks=[None, None, [0], [1]])
     needs = ConfigurationProgramme(model_of(instance), 1.0).needs(1.0)
     assert [len(each.tasks) for each in needs] == [1, 1]
@@ -45,7 +45,7 @@ def test_needs_are_what_the_loops_are_compiled_for():
 
 
 def test_theta_is_that_of_all_groups():
-    """Column generation ends at the optimum of the programme with every group written out."""
+    """Column generation ends at the optimum of the programme over all enumerated groups."""
     instance = Instance(ability=[3, 5, 6, 7, 9, 11], workload=[10, 14, 17])
     model = model_of(instance)
     time, columns, rows, values = 1.05, [], [], []
@@ -83,7 +83,7 @@ def test_closes_what_simple_bounds_leave():
 
 @pytest.mark.parametrize("seed", range(3))
 def test_real_abilities_are_rounded_to_the_safe_side(seed):
-    """On a grid, agents add no less and tasks need no more than in truth."""
+    """On a grid, weights are not rounded down, and needs are not rounded up."""
     instance = machine_covering(30, 10, 1, 100, seed, equal=False, whole=False)
     model = model_of(instance)
     low = makespan_lower_bound(instance)
@@ -95,8 +95,8 @@ def test_real_abilities_are_rounded_to_the_safe_side(seed):
     assert (share >= truth).all()
 
 
-def test_stops_when_told():
-    """Nothing is known then, and nothing is claimed."""
+def test_stops_on_request():
+    """There are no prices then, and nothing is claimed."""
     instance = machine_covering(40, 16, 1, 100, 1)
     configurations = ConfigurationProgramme(model_of(instance), makespan_lower_bound(instance))
     assert configurations.dual_prices(1.0, lambda: True) is None

@@ -26,8 +26,8 @@ def test_paper_scenarios_need_no_solver(scenario):
 
 
 @pytest.mark.parametrize("seed", range(10))
-def test_no_agent_is_made_or_sent_out_of_reach(seed):
-    """Whatever the descent does, no class grows, nobody goes where it cannot, and what was served stays served."""
+def test_classes_and_reach_are_respected(seed):
+    """The descent never exceeds a class, never assigns agents out of reach, and keeps served tasks served."""
     rng = np.random.default_rng(seed)
     instance = Instance(
         ability=rng.uniform(1, 9, 12),
@@ -45,7 +45,7 @@ def test_no_agent_is_made_or_sent_out_of_reach(seed):
 
 
 def test_shortage_never_grows():
-    """Where the time asked for cannot be had, the answer is at least no shorter than the start."""
+    """If the target makespan is infeasible, the shortfall is at most that of the start."""
     rng = np.random.default_rng(3)
     instance = Instance(ability=rng.uniform(1, 9, 9), workload=rng.uniform(5, 20, 4))
     time = float(instance.workload.sum() / instance.ability.sum())
@@ -59,7 +59,7 @@ def test_shortage_never_grows():
     assert shortage(found) <= shortage(counts)
 
 
-def test_stops_when_told():
+def test_stops_on_request():
     """A run that is over changes nothing."""
     _, share, counts, free = start(paper(1, 0), 1.0)
     found, reached = descend(share, counts, free, np.random.default_rng(0), kicks=5, should_stop=lambda: True)

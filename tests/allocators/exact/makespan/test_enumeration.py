@@ -18,8 +18,8 @@ from alloc.problems import agent_classes, evaluate, machine_covering
 
 
 @pytest.mark.parametrize("seed", range(10))
-def test_groups_are_all_that_there_are(seed):
-    """Those that meet the need at no more than the limit and can spare nobody, as found by trying everything."""
+def test_all_minimal_groups_are_enumerated(seed):
+    """The minimal groups that meet the need within the cost limit are those found by brute force."""
     rng = np.random.default_rng(seed)
     weight, price = np.sort(rng.choice(20, 5, replace=False) + 1)[::-1].copy(), rng.integers(0, 10, 5).astype(float)
     count, need, limit = rng.integers(0, 4, 5), int(rng.integers(1, 25)), float(rng.integers(5, 30))
@@ -37,8 +37,8 @@ def test_groups_are_all_that_there_are(seed):
     assert set(groups) == expected
 
 
-def test_gives_up_where_there_are_too_many():
-    """Neither more groups nor more nodes than allowed."""
+def test_gives_up_if_there_are_too_many():
+    """The limits on groups and on nodes are respected."""
     weight, price, count = np.array([3, 2, 1]), np.ones(3), np.full(3, 9)
     least = np.empty((4, 14))[:, :13]  # as the method passes it, of a larger table
     fill_least(weight, price, count, least)
@@ -49,7 +49,7 @@ def test_gives_up_where_there_are_too_many():
 @pytest.mark.parametrize("equal", [True, False])
 @pytest.mark.parametrize("seed", range(6))
 def test_choice_is_a_plan_or_there_is_none(seed, equal):
-    """At the optimum of brute force a plan is chosen; just below it, none is proven to exist."""
+    """At the optimum of brute force a plan is chosen; just below it, infeasibility is proven."""
     instance = machine_covering(8, 3, 1, 30, seed, equal=equal)
     best = brute_force(instance).makespan
     model = Model.build(instance, agent_classes(instance, by_place=False), 3)

@@ -1,4 +1,4 @@
-"""The linear programme of single agents proves nothing that is not so."""
+"""The bound by the linear programme of single agents is valid."""
 
 from types import SimpleNamespace
 from unittest import mock
@@ -24,8 +24,8 @@ def bound_of(instance: Instance, high: float) -> float:
 
 
 @pytest.mark.parametrize("seed", SERVED)
-def test_whatever_the_solver_says_the_bound_holds(seed):
-    """Neither right answers nor wrong ones lead to a bound above the optimum."""
+def test_the_bound_is_valid_for_any_answer_of_the_solver(seed):
+    """Neither right nor wrong answers lead to a bound above the optimum."""
     instance, rng = tiny_instance(seed), np.random.default_rng(seed)
     best = brute_force(instance).makespan
 
@@ -39,6 +39,6 @@ def test_whatever_the_solver_says_the_bound_holds(seed):
 
 
 def test_by_hand():
-    """Three agents of ability 1 share 9 hours of work, another is of no use to it: nobody is done before hour 3."""
+    """Three agents of ability 1 share 9 hours of work, for which a fourth is of no use: the bound is 3 hours."""
     instance = Instance(ability=[1, 1, 1, np.pi], workload=[4, 5, 3], allowed_tasks=[*[[0, 1]] * 3, [2]])
     assert bound_of(instance, 4.0) == pytest.approx(3.0, rel=1e-4)

@@ -19,8 +19,8 @@ def shortfall(value: np.ndarray, base: np.ndarray, need: np.ndarray, goal: tuple
 
 @pytest.mark.parametrize("tasks", [2, 3, 4])
 @pytest.mark.parametrize("seed", range(5))
-def test_partition_is_the_best_there_is(tasks, seed):
-    """Of all partitions of six agents, some barred from some tasks, none has a smaller shortfall; each is used once."""
+def test_partition_is_optimal(tasks, seed):
+    """No partition of six agents with limited reach has a smaller shortfall; each agent is used once."""
     rng = np.random.default_rng(seed)
     value = np.zeros((MAX_TASKS, MAX_POOL))
     value[:tasks, :6] = rng.integers(1, 20, 6) * (rng.random((tasks, 6)) < 0.8)
@@ -37,7 +37,7 @@ def test_partition_is_the_best_there_is(tasks, seed):
 
 
 def test_nothing_within_the_limit():
-    """Where the shortfall of every partition is more than is allowed, none is chosen."""
+    """If the shortfall of every partition exceeds the limit, none is chosen."""
     value, sums = np.ones((MAX_TASKS, MAX_POOL)), np.empty((MAX_TASKS + 1, 1 << MAX_POOL))
     chosen = np.full(MAX_TASKS, -1)
     state = np.ones(1, dtype=np.uint64)
@@ -46,7 +46,7 @@ def test_nothing_within_the_limit():
 
 
 def test_shortfall_never_grows():
-    """The shortfall never grows, agents that cannot go somewhere add nothing, and the best places are reported."""
+    """The shortfall never grows, agents out of reach add nothing, and the best assignment is reported."""
     rng = np.random.default_rng(2)
     work = np.repeat(rng.integers(1, 100, 30).astype(float)[:, None], 12, axis=1) * (rng.random((30, 12)) < 0.7)
     need = np.full(12, np.floor(work.max(axis=1).sum() / 12))
@@ -62,7 +62,7 @@ def test_shortfall_never_grows():
 
 
 def test_perfect_partition_is_found():
-    """Agents cut from twenty equal tasks are put together again."""
+    """A perfect partition into twenty equal tasks is found."""
     rng = np.random.default_rng(0)
     cuts = np.sort(rng.integers(1, 1000, (20, 2)), axis=1)
     ability = np.diff(np.column_stack([np.zeros(20), cuts, np.full(20, 1000)]), axis=1).ravel()

@@ -15,7 +15,7 @@ def some_can_be_served(instance: Instance) -> bool:
 
 @pytest.mark.parametrize("seed", seeds_where(some_can_be_served, 30))
 def test_optimum_of_tiny_instances(seed):
-    """On tiny instances of every sort the optimum is found when asked for; if some cannot be served, the others are."""
+    """On tiny instances of every kind, the optimum is found; tasks that can be served are."""
     instance = tiny_instance(seed)
     best = brute_force(instance)
     start = serve_all(instance, greedy(instance))
@@ -30,8 +30,8 @@ def test_optimum_of_tiny_instances(seed):
         assert score.makespan == pytest.approx(best.makespan, rel=1e-8)
 
 
-def test_found_plans_have_the_makespan_asked_for():
-    """Of what it says to have found, the evaluator thinks likewise."""
+def test_found_plans_have_the_target_makespan():
+    """The evaluator confirms the makespan of plans reported as found."""
     instance = machine_covering(40, 10, 1, 100, 0, equal=False)
     model = Model.build(instance, agent_classes(instance, by_place=False), 10)
     search = RepartitionSearch(model, 0)
@@ -43,7 +43,7 @@ def test_found_plans_have_the_makespan_asked_for():
 
 
 def test_same_seed_same_plan():
-    """The random numbers come from the seed alone."""
+    """Random numbers depend only on the seed."""
     instance = machine_covering(30, 10, 100, 800, 1)
     plans = []
     for _ in range(2):

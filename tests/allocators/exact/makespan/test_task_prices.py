@@ -19,7 +19,7 @@ def bound_of(instance: Instance, high: float) -> float:
 
 @pytest.mark.parametrize("seed", seeds_where(all_can_be_served, 40))
 def test_no_prices_exclude_the_optimum(seed):
-    """On tiny instances of every sort, the bound is at most the optimum of brute force."""
+    """On tiny instances of every kind, the bound is at most the optimum of brute force."""
     instance = tiny_instance(seed)
     if instance.workload.any() and instance.reach.neighbours is not None:
         best = brute_force(instance).makespan
@@ -27,14 +27,14 @@ def test_no_prices_exclude_the_optimum(seed):
 
 
 def test_by_hand():
-    """Three agents of ability 1 share 9 hours of work, another is of no use to it: nobody is done before hour 3."""
+    """Three agents of ability 1 share 9 hours of work, for which a fourth is of no use: the bound is 3 hours."""
     instance = Instance(ability=[1, 1, 1, np.pi], workload=[4, 5, 3], allowed_tasks=[*[[0, 1]] * 3, [2]])
     assert bound_of(instance, 4.0) == pytest.approx(3.0, rel=1e-3)
 
 
 @pytest.mark.slow
-def test_a_plan_gets_the_bound_where_a_linear_programme_is_too_large():
-    """With thousands of agents of short range, the bound after a run is more than the simple one."""
+def test_the_bound_is_used_if_a_linear_programme_is_too_large():
+    """With thousands of agents of short range, the bound of a run exceeds the simple one."""
     rng = np.random.default_rng(0)
     instance = Instance(
         ability=rng.integers(1, 10, 20_000),
@@ -50,8 +50,8 @@ def test_a_plan_gets_the_bound_where_a_linear_programme_is_too_large():
 
 
 @pytest.mark.parametrize("gathered", [False, True])
-def test_the_bound_does_not_depend_on_what_has_been_gathered_before(gathered, monkeypatch):
-    """Where pairs within reach are too many to be gathered in time, there is no bound, even if they are at hand."""
+def test_the_bound_does_not_depend_on_cached_neighbours(gathered, monkeypatch):
+    """With too many pairs within reach to gather in time there is no bound, even if they are cached."""
     monkeypatch.setattr("alloc.allocators.bounds.GATHERED_PER_SECOND", 1)
     monkeypatch.setattr("alloc.allocators.bounds.LP_SIZE_LIMIT", 1)
     monkeypatch.setattr("alloc.problems.distances.reach.TABLE_LIMIT", 1)
