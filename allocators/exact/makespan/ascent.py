@@ -97,7 +97,7 @@ class ConfigurationAscent:
         costs = cheapest_groups(weight, price, count, need, used)
         cost, total = float(costs.sum()), float(price @ count)
         theta = cost / total
-        is_excluded = cost > total  # a comparison of whole numbers
+        is_excluded = cost > total  # exact: a comparison of integers
         if is_excluded:
             self.proven = self._time
             self._time *= 1 + max(min(SMALL_RISE, theta - 1), min(LARGEST_RISE, (theta - 1) / 4))

@@ -156,7 +156,7 @@ def _least_costs(needs: TaskNeeds, price: FloatArray, count: WholeArray) -> tupl
     order = usable[np.argsort(-needs.weight[usable], kind="stable")]
     if len(order) * int(needs.need.max()) > MAX_CELLS:
         return None
-    least = np.empty((len(order) + 1, int(needs.need.max()) + 2))[:, :-1]  # as its parts: a whole is another type
+    least = np.empty((len(order) + 1, int(needs.need.max()) + 2))[:, :-1]  # a slice: the same type as its parts
     fill_least(needs.weight[order], price[order], count[order], least)
     return order, least
 

@@ -1,1 +1,1 @@
-"""A planner inside another program: it is told what happens and what agents report, and answers orders in time."""
+"""A planner to embed in other programs: it takes events and reports of agents, and returns orders in time."""

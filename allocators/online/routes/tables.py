@@ -78,7 +78,7 @@ class TaskTables:
     def _between(self, view: View, tasks: list[TaskReport]) -> Floats:
         table = np.zeros((len(tasks), len(tasks)))
         if len(self._ways) > 4 * (table.size + MOST_WAYS):
-            self._ways.clear()  # those of tasks that were over long ago among them
+            self._ways.clear()  # drops distances of tasks closed long ago
         for i, one in enumerate(tasks):
             for j, other in enumerate(tasks):
                 pair = one.facts.id, other.facts.id

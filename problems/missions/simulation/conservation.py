@@ -78,9 +78,9 @@ def _of_task(state: MissionState, task: TaskState) -> Iterator[str]:
     if min(left, task.done, task.cancelled, task.missed, task.appeared, task.grown) < 0:
         yield f"a ledger of {name!r} is below 0"
     if task.workers and task.status is not TaskStatus.OPEN:
-        yield f"somebody works at {name!r}, which is {task.status}"
+        yield f"an agent works at {name!r}, which is {task.status}"
     if task.workers and not task.facts.appears <= state.hour <= task.facts.deadline:
-        yield f"somebody works at {name!r} before it appears or after its deadline"
+        yield f"an agent works at {name!r} before it appears or after its deadline"
     for agent in task.workers.values():
         node = state.mission.instance.n + task.index
         if agent.status not in ACTIVE or agent.task is not task or node not in agent.place.nodes:

@@ -53,7 +53,7 @@ def test_inconsistent_ledgers_are_detected():
         "battery of 'a1' lost": lambda state: setattr(state.agents[0], "battery", 1.0),
         "flew": lambda state: setattr(state.agents[0], "distance", 7.0),
         "is idle and has a task": lambda state: setattr(state.agents[0], "task", state.tasks[0]),
-        "somebody works at 't1', which is done": lambda state: state.tasks[0].workers.update({0: state.agents[0]}),
+        "an agent works at 't1', which is done": lambda state: state.tasks[0].workers.update({0: state.agents[0]}),
     }
     for words, breaks_it in breaks.items():
         simulation = run(Mission(ONE), {0.0: {"a1": Order("t1")}})

@@ -1,4 +1,4 @@
-"""The integer programme that selects one group for each task among those that a better plan may use; by HiGHS.
+"""The integer programme that picks one group for each task, of all that a better plan may have; by HiGHS.
 
 References
 ----------
@@ -18,36 +18,36 @@ from alloc.allocators.exact.monitor import SolverMonitor
 from alloc.problems.instance import FloatArray
 
 TOLERANCE = 1e-9
-"""Feasibility and integrality tolerance of HiGHS."""
+"""How far HiGHS may be off a row or an integer."""
 
 PROBING = 2**15
-"""Presolve rule that HiGHS is to skip: for a thousand groups or more it takes all the time."""
+"""Rule of presolving that HiGHS is to leave out: on a thousand groups or more it takes all the time."""
 
 REPEATABLE_NODES = 5_000
-"""Limit of repeatable runs in nodes of the search tree."""
+"""Limit in nodes of the search tree where runs must be repeatable."""
 
 
 NOTHING_BELOW = (highspy.HighsModelStatus.kInfeasible, highspy.HighsModelStatus.kObjectiveBound)
-"""Statuses of HiGHS if no plan costs less than the bound on the objective."""
+"""What HiGHS says where no plan costs less than the bound on the objective."""
 
 
 @dataclass(frozen=True, eq=False)
 class GroupProgramme:
-    """All groups of plans that cost less than `below`, or some of them.
+    """Groups of which every plan that costs less than some cost consists, or some of them.
 
     Attributes
     ----------
     model : EnergyModel
     below : float
-        Upper bound on the cost of plans of interest.
+        That cost.
     task : ndarray of int, shape (g,)
         Task of each group.
     group : csr_array of int, shape (g, p)
         Agents of each pair in each group.
     used : csr_array, shape (g, c)
-        Coefficients of each group in cuts that all plans satisfy.
+        What each group uses of cuts that all plans satisfy.
     limit : ndarray, shape (c,)
-        Right-hand sides of these cuts.
+        Of these cuts.
     """
 
     model: EnergyModel
@@ -60,7 +60,7 @@ class GroupProgramme:
     def solve(
         self, monitor: SolverMonitor, seed: int, *, repeatable: bool, seconds: float = np.inf
     ) -> tuple[WholeArray | None, float]:
-        """Return the agents of each pair in the best plan found, shape (p,), or None, and a lower bound on the cost."""
+        """Return agents of each pair in the best plan found, shape (p,), or None, and what all plans cost at least."""
         highs = highspy.Highs()
         highs.HandleUserInterrupt = True
         scale = 1 / max(1e-300, float(np.abs(self.model.cost).mean()))
@@ -90,7 +90,7 @@ class GroupProgramme:
         return monitor.run(work, highs.cancelSolve) or (None, 0.0)
 
     def _compile(self, scale: float) -> highspy.HighsLp:
-        """Return the programme for HiGHS, with a row for each task, then each class, then each cut."""
+        """Return the programme for HiGHS: a row for each task, then for each class, then for each cut."""
         model, groups, tasks = self.model, len(self.task), len(self.model.need)
         columns = np.arange(groups)
         of_task = csr_array((np.ones(groups), (self.task, columns)), shape=(tasks, groups))

@@ -1,4 +1,4 @@
-"""Annealing by repartitions of a few tasks, with penalties of shortfalls that rise as it cools; compiled."""
+"""Annealing by repartitions of a few tasks, with penalties on shortfalls that rise as it cools; compiled."""
 
 from typing import NamedTuple
 
@@ -11,39 +11,39 @@ from alloc.allocators.runtime.random import RandomState, draw
 from alloc.problems.instance import FloatArray
 
 MOST_TASKS, WIDE_PERIOD, WIDE_PERIOD_SHORT = 3, 10, 2
-"""Tasks in a repartition at the most, and one in how many has so many, also of those that begin with a short task; the
-others have one less."""
+"""Largest number of tasks in a repartition, and one in how many repartitions has that many, in general and if it begins
+with a task with a shortfall; the others have one less."""
 
 MOST_OF_TASK, MOST_IDLE = 10, 6
-"""Agents of a task, and idle ones, that take part in a repartition at the most."""
+"""Largest numbers of agents of a task, and of idle agents, in a repartition."""
 
 MAX_NODES = 2000
-"""Nodes of the search for one repartition."""
+"""Limit on the nodes of the search for one repartition."""
 
 SHORT_PERIOD = 4
-"""One in so many repartitions begins with a short task, if there is one."""
+"""One in so many repartitions begins with a task with a shortfall, if there is one."""
 
 
 class Groups(NamedTuple):
-    """A plan, and what a search needs to change it; the last group is that of idle agents.
+    """A plan, with the data for changing it; the last group is that of idle agents.
 
     Attributes
     ----------
     weight, cost : ndarray, shape (n, m)
-        Part of each task that an agent does, and its flight, in mean flights; ``inf`` out of reach.
+        Share of each task that an agent does, and the cost of its flight, in mean flights; ``inf`` out of reach.
     near : ndarray of int, shape (m, p)
-        Tasks near each task.
+        Nearest tasks of each task.
     noise : ndarray, shape (2^q,)
-        Logistic noise.
+        Samples of logistic noise.
     task : ndarray of int, shape (n,)
     member, size : ndarray of int, shapes (m + 1, n) and (m + 1,)
-        Agents of each group, and how many.
+        Agents of each group, and their number.
     done : ndarray, shape (m,)
     random : ndarray of uint64, shape (1,)
     best : ndarray of int, shape (n,)
-        The plan of least cost without a shortfall.
+        The cheapest plan without a shortfall.
     total : ndarray, shape (2,)
-        Cost of the plan, and of the best one.
+        Cost of the present plan, and of the best one.
     """
 
     weight: FloatArray
@@ -61,7 +61,7 @@ class Groups(NamedTuple):
 
 @compiled
 def draw_tasks(groups: Groups, short: int, chosen: WholeArray) -> int:
-    """Write tasks near each other, and last that of idle agents; return how many tasks these are."""
+    """Draw nearby tasks, followed by that of idle agents, into `chosen`; return their number."""
     m, period, count, random = len(groups.done), WIDE_PERIOD, 1, groups.random
     chosen[0] = draw(random, m)
     if short > 0 and draw(random, SHORT_PERIOD) == 0:
@@ -75,7 +75,7 @@ def draw_tasks(groups: Groups, short: int, chosen: WholeArray) -> int:
         is_new = True
         for x in range(count):
             is_new = is_new and chosen[x] != task
-        if is_new or draw(random, 8) == 0:  # not for ever, where few tasks are near
+        if is_new or draw(random, 8) == 0:  # ends even if few tasks are near
             if not is_new:
                 break
             chosen[count] = task
@@ -86,7 +86,7 @@ def draw_tasks(groups: Groups, short: int, chosen: WholeArray) -> int:
 
 @compiled
 def draw_pool(groups: Groups, chosen: WholeArray, count: int, pool: WholeArray, option: WholeArray) -> int:
-    """Put the agents of groups, of large ones some, at the end of their lists and into the pool; return how many."""
+    """Move agents of the groups, a sample of large ones, to the ends of their lists and the pool; return the count."""
     agents = 0
     for x in range(count + 1):
         group = chosen[x]
@@ -106,7 +106,7 @@ def draw_pool(groups: Groups, chosen: WholeArray, count: int, pool: WholeArray, 
 def apply(
     groups: Groups, chosen: WholeArray, count: int, pool: WholeArray, option: WholeArray, best: WholeArray
 ) -> None:
-    """Give the agents of a pool, the last ones of their groups, their new tasks."""
+    """Move the agents of the pool, which are the last ones of their groups, to their new tasks."""
     idle, cost, total = len(groups.done), groups.cost, groups.total
     for z in range(len(pool)):
         groups.size[chosen[option[z]]] -= 1
@@ -127,17 +127,17 @@ def apply(
 def anneal(
     groups: Groups, price: FloatArray, fixed: float, penalty: float, calls: int, heat: float, cooling: float
 ) -> None:
-    """Make so many repartitions with noise on costs, `heat` at first and times `cooling` after each.
+    """Make `calls` repartitions with noise on costs, of initial size `heat`, multiplied by `cooling` after each.
 
     Parameters
     ----------
     groups : Groups
     price : ndarray, shape (m,)
-        Of all the work on each task.
+        Price of the whole work on each task.
     fixed : float
-        Penalty of a shortfall, however small.
+        Penalty of any shortfall, however small.
     penalty : float
-        Of the work that is missing, as a multiple of its price, or of the mean price.
+        Penalty of missing work, as a multiple of its price, or of the mean price.
     """
     m, mean, random = len(price), price.mean(), groups.random
     most = (MOST_TASKS + 1) * max(MOST_OF_TASK, MOST_IDLE)

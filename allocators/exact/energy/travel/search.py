@@ -1,4 +1,4 @@
-"""Plans of less energy by annealing with repartitions, in cycles."""
+"""Search for plans of less energy by annealing with repartitions, in cycles."""
 
 import numpy as np
 
@@ -7,40 +7,40 @@ from alloc.allocators.exact.knapsack import WholeArray
 from alloc.problems.instance import FloatArray, IntArray
 
 NEAR = 10
-"""Nearest tasks with which a task shares its agents anew."""
+"""Number of nearest tasks with which a task is repartitioned."""
 
 NOISE_SIZE = 2**14
-"""Numbers of noise that are drawn once."""
+"""Number of samples of noise, which are drawn only once."""
 
 FIRST_CYCLE, GROWTH = 100_000, 1.1
-"""Repartitions of the first cycle, and factor on those of the next."""
+"""Number of repartitions of the first cycle, and its growth factor per cycle."""
 
 STEP = 1000
-"""Repartitions in a row with one penalty, at the most."""
+"""Largest number of successive repartitions with the same penalties."""
 
 LAST_HEAT = 0.05
-"""Last noise of each cycle, in mean flights."""
+"""Final noise of each cycle, in mean flights."""
 
 FIXED_PENALTY, PENALTY = 0.5, 4.0
-"""Penalties of full strength: of a shortfall as a multiple of the median price of an agent, and of the work that is
-missing as one of its price."""
+"""Penalties at full strength: of any shortfall, as a multiple of the median price of an agent, and of missing work, as
+a multiple of its price."""
 
 CYCLES = (0.3, 1.0, 1.0), (0.2, 0.4, 0.8), (0.4, 1.0, 1.0), (0.3, 0.4, 0.8), (0.6, 0.25, 1.0)
-"""First noise, and first and last strength of penalties, of cycles in turn; a cycle that has found a better plan is
-followed by one like it. Where agents reach few tasks in time, only the last one finds plans."""
+"""Initial noise, and initial and final strength of penalties, of successive cycles; a cycle that finds a better plan is
+repeated. If agents reach few tasks in time, only the last one finds plans."""
 
 
 class TravelSearch:
-    """An annealed search for plans in which every task has what it needs, where weights depend on the task.
+    """An annealing search for plans that meet all needs, with weights that depend on the task.
 
     Parameters
     ----------
     cost : ndarray, shape (n, m)
-        Of the flight of an agent to a task, ``inf`` out of reach.
+        Cost of the flight of an agent to a task, ``inf`` out of reach.
     task : ndarray of int, shape (n,)
         A plan that meets all needs; m for idle agents.
     task_distance : ndarray, shape (m, m)
-        How far tasks are from each other.
+        Distances between tasks.
     seed : int
     """
 
@@ -71,31 +71,31 @@ class TravelSearch:
 
     @property
     def is_between_cycles(self) -> bool:
-        """Whether a cycle begins next: then weights, prices and the plan may change."""
+        """Whether a cycle begins next, so that weights, prices and the plan may be changed."""
         return self._made == 0
 
     @property
     def best(self) -> WholeArray:
-        """Tasks of agents in the best plan, shape (n,)."""
+        """Task of each agent in the best plan, shape (n,)."""
         return self._groups.best
 
     @property
     def cost(self) -> float:
-        """Sum of flights of the best plan."""
+        """Total cost of flights in the best plan."""
         return float(self._groups.total[1] / self._scale)
 
     def set_weights(self, weight: FloatArray, task: IntArray) -> None:
-        """Set the part of each task that an agent does, shape (n, m), 0 out of reach, and a plan that does all."""
+        """Set the share of each task that an agent does, shape (n, m), 0 out of reach, and a feasible plan."""
         self._groups.weight[:] = weight
         self.set_plan(task)
 
     def set_plan(self, task: IntArray) -> None:
-        """Go on from another plan."""
+        """Continue from another plan."""
         self._groups.best[:] = task
         self._restart()
 
     def set_prices(self, price: FloatArray) -> None:
-        """Set the price of each agent, shape (n,), in the unit of costs: that of work on a task follows from it."""
+        """Set the price of each agent, shape (n,), in the unit of costs, from which prices of work on tasks follow."""
         groups, price = self._groups, price * self._scale
         self._fixed = FIXED_PENALTY * float(np.median(price))
         for j in range(len(groups.done)):
@@ -108,7 +108,7 @@ class TravelSearch:
             self._price[j] = ratio[order[last]]
 
     def anneal(self, calls: int) -> None:
-        """Make so many repartitions, but not beyond the end of the cycle; the next one begins with the best plan."""
+        """Make `calls` repartitions, at most to the end of the cycle; the next cycle starts from the best plan."""
         calls = min(calls, self._length - self._made)
         while calls > 0:
             now, progress = min(calls, STEP, self._length - self._made), self._made / self._length
@@ -128,7 +128,7 @@ class TravelSearch:
         self._number += not is_better
 
     def _restart(self) -> None:
-        """Go back to the best plan, and compute from scratch what rounding has changed."""
+        """Return to the best plan, and recompute sums to remove accumulated rounding errors."""
         groups, tasks = self._groups, len(self._groups.done)
         groups.task[:] = groups.best
         groups.size[:] = 0
@@ -143,7 +143,7 @@ class TravelSearch:
 
 
 def compile_loops() -> None:
-    """Compile all loops, or read them from the cache, so that no run waits for it."""
+    """Compile all loops, or load them from the cache, so that they do not delay a run."""
     search = TravelSearch(np.ones((2, 2)), np.array([0, 1]), np.ones((2, 2)), 0)
     search.set_weights(np.ones((2, 2)), np.array([0, 1]))
     search.set_prices(np.ones(2))
