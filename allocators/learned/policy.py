@@ -22,7 +22,7 @@ from alloc.problems import Allocation, InputError, Instance, Objective
 from alloc.problems.arguments import text
 
 GPU_PAIRS, GPU_GAMES = 40_000, 512
-"""`pairs_per_stream` and `games_per_region` of the planner on a GPU, where ten times as many games take as long."""
+"""`pairs_per_stream` and `games_per_region` of the planner on a GPU, where ten times as many games take no longer."""
 
 START_ENERGY_WEIGHT = 2.0
 """Weight of energy in the game from which local search starts, without travel times."""

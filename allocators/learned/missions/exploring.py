@@ -1,4 +1,4 @@
-"""Where to look around: the place that is near, and was not seen for long by anybody, as far as an agent knows."""
+"""Exploration: the choice of a near place that, to an agent's knowledge, no agent has seen for long."""
 
 import math
 
@@ -11,16 +11,16 @@ from alloc.allocators.runtime.compiled import compiled_in_place
 from alloc.problems.fields import FloatArray
 
 CELLS = 8
-"""Cells of the area along two axes, of each of which an agent remembers when it was last seen."""
+"""Number of cells of the area along two axes; an agent remembers when each cell was last seen."""
 
 BATTERY_SHARE = 0.25
-"""Part of its battery that an agent spends on one flight without a task at the most."""
+"""Maximum share of its battery that an agent spends on a flight without a task."""
 
 SPREAD = 0.3
-"""Part of the choice that is chance, so that agents who know the same go different ways."""
+"""Random share of the rating, so that agents with the same knowledge explore different places."""
 
 EXPLORING = 11
-"""What chances are for, as `alloc.problems.missions.chance` counts."""
+"""Purpose of the random numbers, see `alloc.problems.missions.chance`."""
 
 
 @compiled_in_place
@@ -33,7 +33,7 @@ def centre(area: FloatArray, cell: int) -> tuple[float, float, float]:
 
 @compiled_in_place
 def notice(area: FloatArray, sensing: float, x: float, y: float, hour: float, seen: FloatArray) -> None:
-    """Note that all within the sensing radius of a place was seen at an hour; `seen` has one hour for each cell."""
+    """Record that all cells within the sensing radius of a place were seen at an hour; `seen` has an hour per cell."""
     left, low = area[0, 0], area[0, 1]
     wide, deep = (area[1, 0] - left) / CELLS, (area[1, 1] - low) / CELLS
     reach = sensing * sensing
@@ -55,7 +55,7 @@ def find_unseen(
     goal: int,
     look: FloatArray,
 ) -> int:
-    """Fill in how far off and how long unseen the best cell to fly to is; return its number, -1 if there is none.
+    """Write distance and time since last seen of the best cell to fly to; return its index, -1 if there is none.
 
     Parameters
     ----------
@@ -63,11 +63,11 @@ def find_unseen(
     area : ndarray, shape (2, 3)
     sensing : float
     last : ndarray, shape (cells,)
-        Hour at which the agent last saw each cell; others it heard of are added.
+        Hour at which the agent last saw each cell; updated with reports on other agents.
     seed, number : int
-        Of the run, and of the agent.
+        Seed of the run, and index of the agent.
     goal : int
-        Cell to which it is on its way, which it keeps to; -1 for none.
+        Cell to which the agent is already flying, which is kept; -1 for none.
     look : ndarray, shape (3,)
         See `fill_options`.
     """
@@ -94,7 +94,7 @@ def find_unseen(
 
 @compiled_in_place
 def rate_cell(own: FloatArray, area: FloatArray, last: FloatArray, cell: int) -> tuple[float, float]:
-    """Return how far off a cell is, and how long it was not seen, from 0 to 1."""
+    """Return the distance of a cell, and the time since it was last seen, scaled from 0 to 1."""
     x, y, z = centre(area, cell)
     dx, dy, dz = x - own[known.X], y - own[known.Y], z - own[known.Z]
     way = math.sqrt(dx * dx + dy * dy + dz * dz)

@@ -1,4 +1,4 @@
-"""What the network of `gappo` is told of an option; numbers of the features, and where training begins."""
+"""Features of an option for the network of `gappo` in missions: their indices, and the weights of an initial rule."""
 
 (
     TRAVEL,
@@ -53,7 +53,7 @@ FIRST_WEIGHTS = {
     UNSEEN: 0.3,
 }
 SHARPNESS = 6.0
-"""Factor on these weights: samples of the first network seldom differ from its best option."""
+"""Factor on these weights, with which samples of the initial network seldom differ from its best option."""
 
 FIRST_SKIP = [SHARPNESS * FIRST_WEIGHTS.get(feature, 0.0) for feature in range(FEATURES)]
-"""Linear weights of a rule that training begins with."""
+"""Linear weights of the rule with which training begins."""

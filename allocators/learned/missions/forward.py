@@ -1,4 +1,4 @@
-"""The network of `gappo` in missions, compiled: the scores of one agent's options."""
+"""The compiled network of `gappo` in missions, which scores the options of an agent."""
 
 import numpy as np
 
@@ -14,16 +14,16 @@ SLOPE = F(0.1)
 def score(
     options: Singles, count: int, weights: MissionWeights, token: Singles, pooled: Singles, scores: Singles
 ) -> None:
-    """Fill the scores of the first `count` options, as `MissionNetwork` gives them.
+    """Write the scores of the first `count` options, equal to those of `MissionNetwork`.
 
     Parameters
     ----------
     options : ndarray, shape (most, features)
-        Columns behind the features are 0.
+        Columns after the features are 0.
     count : int
     weights : MissionWeights
     token, pooled : ndarray, shape (most, width) and (2, width)
-        Scratch.
+        Scratch space.
     scores : ndarray, shape (most,)
     """
     largest = F(-np.inf)
@@ -57,7 +57,7 @@ def score(
 def add_context(
     token: Singles, count: int, largest: np.float32, weights: MissionWeights, pooled: Singles, attention: Singles
 ) -> None:
-    """Fill the pooled token and what it adds to each option, the two rows of `pooled`."""
+    """Write the pooled token, and its contribution to each option, into the two rows of `pooled`."""
     pooled[0, :] = F(0)
     total = F(0)
     for row in range(count):

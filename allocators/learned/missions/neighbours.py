@@ -1,7 +1,7 @@
-"""What free neighbours will choose: an agent decides for them as if in their place, and then for itself; compiled.
+"""Compiled prediction of the choices of free neighbours: an agent first decides in their place, then for itself.
 
-When a coalition has done its task, all its agents are free at once and know the same. If each decided by itself they
-would choose alike, and learn of that too late.
+When a coalition has completed its task, all its agents become free at once with the same knowledge. If each decided
+independently, they would make the same choice, and learn of that too late.
 """
 
 from typing import NamedTuple
@@ -22,24 +22,24 @@ Scratch = tuple[Singles, Singles, Singles, Singles, IntArray]
 """Options, token, pooled, scores and choice, as in `Room`."""
 
 ORDER = (known.STRENGTH, known.CHARGE, known.OTHER_X, known.OTHER_Y)
-"""What decides who is first, the largest number first."""
+"""Figures of agents by which the order of decisions is determined, largest first."""
 
 MOST = 6
-"""Neighbours for whom an agent decides at the most."""
+"""Maximum number of neighbours for which an agent decides."""
 
 
 class Swap(NamedTuple):
-    """Room for what is so of an agent itself while it decides in the place of another.
+    """Storage for an agent's own situation while it decides in the place of another agent.
 
     Attributes
     ----------
     own : ndarray, shape (OWN,)
     other : ndarray, shape (OTHER, 2)
-        The agent as others see it, and the other in whose place it decides.
+        The agent as others see it, and the agent in whose place it decides.
     distance : ndarray, shape (m,)
     can : ndarray of bool, shape (m,)
     waits : ndarray of bool, shape (n,)
-        Who is still to decide.
+        Agents that have not decided yet.
     """
 
     own: FloatArray
@@ -50,7 +50,7 @@ class Swap(NamedTuple):
 
 
 def swap_for(n: int, m: int) -> Swap:
-    """Return room for n agents and m tasks."""
+    """Return storage for n agents and m tasks."""
     return Swap(
         np.zeros(known.OWN), np.zeros((known.OTHER, 2)), np.zeros(m), np.zeros(m, np.bool_), np.zeros(n, np.bool_)
     )
@@ -58,9 +58,10 @@ def swap_for(n: int, m: int) -> Swap:
 
 @compiled_in_place
 def precedes(one: FloatArray, i: int, other: FloatArray, k: int) -> bool:
-    """Return whether an agent decides before another: the stronger, then that of more battery, then by place.
+    """Return whether an agent decides before another: by ability, then battery, then position.
 
-    So all agree on the order without a message; of two that are equal in all of that, each takes itself for the first.
+    Thus all agents agree on the order without messages; of two that are equal in all figures, each regards itself as
+    first.
     """
     for number in ORDER:
         if one[number, i] != other[number, k]:
@@ -70,17 +71,17 @@ def precedes(one: FloatArray, i: int, other: FloatArray, k: int) -> bool:
 
 @compiled_in_place
 def foresee(situation: Situation, swap: Swap, look: FloatArray, room: Scratch, weights: MissionWeights) -> int:
-    """Fill in what free neighbours will choose that decide before an agent without a task; return how many they are.
+    """Write the predicted choices of free neighbours that decide before an agent without a task; return their number.
 
-    Those that were free when the agent last heard of them have decided since; of those that are free now, the ones
-    that come before it by `precedes` decide first. An agent that has a task keeps to it as a rule, and does without.
+    Agents that were free when last heard of have decided since; of those that are free now, the ones that precede the
+    agent (`precedes`) decide first. For an agent that has a task, which it usually keeps, nothing is predicted.
 
     Parameters
     ----------
     situation : Situation
     swap : Swap
     look : ndarray, shape (3,)
-        See `fill_options`; what the agent knows of places to look around counts for others as well.
+        See `fill_options`; the agent's own knowledge of places to explore is used for others as well.
     room : Scratch
     weights : MissionWeights
     """
@@ -109,7 +110,7 @@ def foresee(situation: Situation, swap: Swap, look: FloatArray, room: Scratch, w
 
 @compiled_in_place
 def step_out(situation: Situation, swap: Swap) -> None:
-    """Keep what is so of the agent itself, and note it as others see it."""
+    """Store the agent's own situation, and enter the agent as others see it."""
     own, mine = situation.own, swap.other
     for number in range(known.OWN):
         swap.own[number] = own[number]
@@ -123,7 +124,7 @@ def step_out(situation: Situation, swap: Swap) -> None:
 
 @compiled_in_place
 def step_in(situation: Situation, swap: Swap) -> None:
-    """Restore what is so of the agent itself."""
+    """Restore the agent's own situation."""
     for number in range(known.OWN):
         situation.own[number] = swap.own[number]
     for j in range(len(swap.can)):
@@ -134,7 +135,7 @@ def step_in(situation: Situation, swap: Swap) -> None:
 def decide_for(
     situation: Situation, swap: Swap, i: int, look: FloatArray, room: Scratch, weights: MissionWeights
 ) -> None:
-    """Fill in what a neighbour will choose; the agent has its place among others meanwhile."""
+    """Write the predicted choice of a neighbour, in whose place among the others the agent is meanwhile."""
     own, other, task = situation.own, situation.other, situation.task
     options, token, pooled, scores, choice = room
     own[known.X], own[known.Y], own[known.Z] = other[known.OTHER_X, i], other[known.OTHER_Y, i], other[known.OTHER_Z, i]

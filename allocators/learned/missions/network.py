@@ -1,4 +1,4 @@
-"""The network of `gappo` in missions: it scores an agent's options, whatever their number and order."""
+"""The network of `gappo` in missions, which scores an agent's options, independent of their number and order."""
 
 import numpy as np
 import torch
@@ -9,11 +9,11 @@ from alloc.allocators.learned.missions.network_arrays import HIDDEN, WIDTH, Miss
 
 
 class MissionNetwork(nn.Module):
-    """Scores of options, each seen beside all others by attention.
+    """A network that scores options in the context of all others by attention.
 
-    Options are tasks that the agent knows and can take, looking around, and staying. Each becomes a token; the tokens
-    are pooled by attention; the score of an option is read from its token and the pooled one, with a linear part of its
-    features. Without order and of any number, it is invariant to permutations (Zaheer et al. 2017, arXiv:1703.06114;
+    Options are tasks that the agent knows and can take, exploring, and staying. Each becomes a token; the tokens are
+    pooled by attention; the score of an option is computed from its token and the pooled one, plus a linear function of
+    its features. For any number of options, it is equivariant to permutations (Zaheer et al. 2017, arXiv:1703.06114;
     pooling by attention as in Lee et al. 2019, arXiv:1810.00825).
     """
 
@@ -33,12 +33,12 @@ class MissionNetwork(nn.Module):
         ----------
         options : Tensor, shape (batch, options, FEATURES)
         is_option : Tensor of bool, shape (batch, options)
-            False where a row is filled up.
+            False for padding.
 
         Returns
         -------
         scores : Tensor, shape (batch, options)
-            ``-inf`` where there is no option.
+            ``-inf`` for padding.
         """
         token = nn.functional.leaky_relu(self.inner(options), 0.1)
         attention = self.query(token).squeeze(-1).masked_fill(~is_option, -torch.inf).softmax(-1)
@@ -49,7 +49,7 @@ class MissionNetwork(nn.Module):
 
 
 def compiled_weights(network: MissionNetwork) -> MissionWeights:
-    """Return the weights that score options."""
+    """Return the weights of the network as arrays for compiled loops."""
 
     def matrix(layer: nn.Linear, width: int = HIDDEN) -> Singles:
         weight = layer.weight.detach().numpy()
@@ -74,9 +74,10 @@ def compiled_weights(network: MissionNetwork) -> MissionWeights:
 
 
 def first_network(seed: int) -> MissionNetwork:
-    """Return a network that begins as a plain rule: near tasks, large shares of work, and what was begun.
+    """Return an initial network, which is nearly a linear rule.
 
-    Its hidden part has small random weights.
+    The rule prefers near tasks, large shares of work, and tasks that the agent has begun. The hidden layers have small
+    random weights.
     """
     generator = torch.Generator().manual_seed(seed)
     network = MissionNetwork()

@@ -11,11 +11,11 @@ HIDDEN = 16
 """Width of the network."""
 
 WIDTH = 32
-"""Columns for the features of an option: more than there are, as processors add up numbers by eight or sixteen."""
+"""Number of columns for the features of an option, padded for vector instructions on eight or sixteen numbers."""
 
 
 class MissionWeights(NamedTuple):
-    """Weights of a `MissionNetwork` that score options; matrices by output, then input, as in torch.
+    """Weights of a `MissionNetwork`; matrices are indexed by output, then input, as in torch.
 
     `inner` and `skip` have `WIDTH` columns.
     """

@@ -1,4 +1,4 @@
-"""The options of an agent in a mission, and what the network is told of each, compiled."""
+"""The options of an agent in a mission and their features, in compiled loops."""
 
 import numpy as np
 
@@ -12,30 +12,30 @@ from alloc.allocators.runtime.compiled import compiled_in_place, inlined
 from alloc.problems.fields import FloatArray, IntArray
 
 LOOK, WAIT = -1, -2
-"""Options that are no task: to look around, and to stay."""
+"""Options other than tasks: to explore, and to stay."""
 
 NEAR = 0.15
-"""Part of the span within which other work counts as near by."""
+"""Share of the span within which other work counts as nearby."""
 
 
 @inlined
 def squashed(value: float) -> float:
-    """Return a number in [0, 1] for one from 0 to infinity."""
+    """Map a number in [0, inf] to [0, 1]."""
     return 1.0 - 1.0 / (1.0 + value)
 
 
 @compiled_in_place
 def time_scale(own: FloatArray) -> float:
-    """Return the hours of the longest flight of an agent; 1 where flights take no time."""
+    """Return the hours of the longest flight of an agent; 1 if flights take no time."""
     hours = own[known.SPAN] / own[known.SPEED]
     return hours if hours > 0 else 1.0
 
 
 @compiled_in_place
 def expect(situation: Situation) -> int:
-    """Fill in who comes to each task, and when it is done without the agent; return how many others have no task.
+    """Write which agents come to each task, and when it is done without the agent; return how many others are idle.
 
-    Only tasks that the agent can take are filled in.
+    Only tasks that the agent can take are considered.
     """
     coming, arrives, target = situation.coming, situation.other[known.ARRIVES], situation.target
     coming.first[:] = NOBODY
@@ -58,7 +58,7 @@ def expect(situation: Situation) -> int:
 
 @inlined
 def queue(coming: Coming, arrives: FloatArray, j: int, i: int) -> None:
-    """Put another who comes to a task behind those who are there no later: mostly all, or all who work there."""
+    """Insert another agent that comes to a task after those that arrive no later, usually at the end."""
     first, following, last, working = coming.first, coming.following, coming.last, coming.working
     before, after = NOBODY, first[j]
     if after != NOBODY and arrives[last[j]] <= arrives[i]:
@@ -80,7 +80,7 @@ def queue(coming: Coming, arrives: FloatArray, j: int, i: int) -> None:
 
 @inlined
 def done_without(situation: Situation, j: int) -> tuple[int, float]:
-    """Return how many others come to a task, and the hour at which they have done it."""
+    """Return how many other agents come to a task, and the hour at which they complete it."""
     arrives, strength, following = (
         situation.other[known.ARRIVES],
         situation.other[known.STRENGTH],
@@ -101,7 +101,7 @@ def done_without(situation: Situation, j: int) -> tuple[int, float]:
 
 @inlined
 def done_with(situation: Situation, j: int, arrival: float, left: float) -> float:
-    """Return the hour at which a task is done if the agent arrives at an hour, with others who come there in turn."""
+    """Return the hour at which a task is done if the agent arrives at `arrival`, together with the other agents."""
     arrives, strength, following = (
         situation.other[known.ARRIVES],
         situation.other[known.STRENGTH],
@@ -128,16 +128,16 @@ def done_with(situation: Situation, j: int, arrival: float, left: float) -> floa
 
 @compiled_in_place
 def fill_options(situation: Situation, look: FloatArray, options: Singles, choice: IntArray) -> int:
-    """Fill in the options of an agent and their features; return how many there are.
+    """Write the options of an agent and their features; return the number of options.
 
     Parameters
     ----------
     situation : Situation
     look : ndarray, shape (3,)
-        Whether it can look around, and how far off and how long unseen that place is, both from 0 to 1.
+        Whether it can explore, and the distance of that place and the time since it was last seen, both from 0 to 1.
     options : ndarray, shape (m + 2, FEATURES)
     choice : ndarray of int, shape (m + 2,)
-        Task of each, `LOOK` or `WAIT`.
+        Task of each option, `LOOK` or `WAIT`.
     """
     idle = expect(situation)
     count = 0
@@ -168,7 +168,7 @@ def fill_options(situation: Situation, look: FloatArray, options: Singles, choic
 
 @inlined
 def fill_task(situation: Situation, j: int, option: Singles, idle: int, scale: float) -> None:
-    """Fill the features of a task; `scale` is that of times."""
+    """Write the features of a task; `scale` is the unit of times."""
     own, task = situation.own, situation.task
     others, without = situation.coming.others[j], situation.coming.without[j]
     hour = own[known.HOUR]
@@ -202,7 +202,7 @@ def fill_task(situation: Situation, j: int, option: Singles, idle: int, scale: f
 
 @inlined
 def rivals(situation: Situation, j: int, distance: float, idle: int) -> float:
-    """Return how many others that have no task are nearer to one."""
+    """Return how many other agents without a task are nearer to a task."""
     x, y, z = situation.task[known.TASK_X, j], situation.task[known.TASK_Y, j], situation.task[known.TASK_Z, j]
     is_manhattan = situation.own[known.METRIC] == known.MANHATTAN_WAYS
     return nearer(situation.coming.idle_places, idle, (x, y, z), distance, is_manhattan)
@@ -210,7 +210,7 @@ def rivals(situation: Situation, j: int, distance: float, idle: int) -> float:
 
 @compiled_in_place
 def nearer(places: FloatArray, count: int, to: Point, distance: float, is_manhattan: bool) -> int:
-    """Return how many of the first places are nearer to one than a distance; by straight lines, that is by squares."""
+    """Return how many of the first places are within a distance of a place; Euclidean distances are squared."""
     x, y, z = to
     limit = distance if is_manhattan else distance * distance
     at_x, at_y, at_z = places[0], places[1], places[2]
@@ -223,7 +223,7 @@ def nearer(places: FloatArray, count: int, to: Point, distance: float, is_manhat
 
 @compiled_in_place
 def fill_crowding(situation: Situation, tasks: IntArray, options: Singles) -> None:
-    """Fill in how much other work there is near each task."""
+    """Write the amount of other work near each task."""
     task, near = situation.task, NEAR * situation.own[known.SPAN]
     places = situation.coming.task_places
     for row in range(len(tasks)):
@@ -238,7 +238,7 @@ def fill_crowding(situation: Situation, tasks: IntArray, options: Singles) -> No
 
 @compiled_in_place
 def fill_whole(situation: Situation, choice: IntArray, tasks: int, options: Singles) -> None:
-    """Fill the features that all options share, and those that compare with a mean."""
+    """Write the features that all options share, and those relative to a mean."""
     agents, ability = 1.0, situation.own[known.ABILITY]
     for i in range(situation.others[0]):
         if situation.counts[i]:
@@ -251,7 +251,7 @@ def fill_whole(situation: Situation, choice: IntArray, tasks: int, options: Sing
 def fill_shared(
     situation: Situation, choice: IntArray, tasks: int, options: Singles, agents: float, ability: float
 ) -> None:
-    """Fill them where it is known how many agents there are, this one included, and the sum of their abilities."""
+    """Write these features, given the number of agents including this one, and the sum of their abilities."""
     own, priority, work = situation.own, 0.0, 0.0
     for row in range(tasks):
         priority += situation.task[known.PRIORITY, choice[row]] / tasks

@@ -1,4 +1,4 @@
-"""Missions led by the network of `gappo`, event by event, in compiled loops."""
+"""Missions under the network of `gappo`, event by event, in compiled loops."""
 
 from typing import NamedTuple
 
@@ -30,11 +30,11 @@ from alloc.allocators.runtime.compiled import compiled_in_place, inlined
 from alloc.problems.fields import FloatArray, IntArray
 
 REVIEW = 10
-"""Radio periods after which an agent that is busy considers its options anew, if nothing else makes it do so."""
+"""Number of radio periods after which a busy agent reconsiders its options without other cause."""
 
 
 class Room(NamedTuple):
-    """Room for decisions, and what agents remember between them.
+    """Workspace of decisions, and the memory of agents between them.
 
     Attributes
     ----------
@@ -50,11 +50,11 @@ class Room(NamedTuple):
     seen : ndarray, shape (n, cells)
         Hour at which each agent last saw each cell, -1 for never.
     goal : ndarray of int, shape (n,)
-        Cell to which it flies to look around.
+        Cell to which each agent flies for exploring.
     decided : ndarray, shape (n,)
-        Hour at which it last considered its options.
+        Hour at which each agent last considered its options.
     tasks : ndarray of int, shape (n,)
-        Open tasks that it knew then.
+        Number of open tasks that it knew then.
     periods : int
     saved, counted, news : ndarray of int, shape (n,)
         See `is_to_send`.
@@ -80,7 +80,7 @@ class Room(NamedTuple):
 
 
 def room_for(n: int, m: int, periods: int = 1) -> Room:
-    """Return room for the decisions of n agents on m tasks, who send a message every so many radio periods."""
+    """Return a workspace for n agents, which send a message every `periods` radio periods, and m tasks."""
     return Room(
         situation=empty(n, m),
         swap=swap_for(n, m),
@@ -104,7 +104,7 @@ def room_for(n: int, m: int, periods: int = 1) -> Room:
 
 @inlined
 def is_due(room: Room, number: int, hour: float, period: float, tasks: int, is_busy: bool) -> bool:
-    """Whether an agent is to consider its options: it is not busy, knows of other tasks, or has not for a while."""
+    """Return whether an agent should consider its options: it is idle, knows other tasks, or a review is due."""
     return not is_busy or tasks != room.tasks[number] or hour - room.decided[number] >= REVIEW * period
 
 
@@ -112,18 +112,18 @@ def is_due(room: Room, number: int, hour: float, period: float, tasks: int, is_b
 def consider(
     room: Room, area: FloatArray, sensing: float, seed: int, number: int, row: int, weights: MissionWeights
 ) -> int:
-    """Return how many options an agent has in the situation that is filled in, with their scores in `room`.
+    """Return the number of options of an agent in the given situation, and write their scores into `room`.
 
     Parameters
     ----------
     room : Room
     area : ndarray, shape (2, 3)
     sensing : float
-        ``inf`` where nothing is to be looked for. An agent that has a task does not look around.
+        Sensing radius; ``inf`` without exploration. An agent that has a task does not explore.
     seed, number : int
-        Of the run and of the agent, for its chances.
+        Seed of the run and index of the agent, for random numbers.
     row : int
-        Of the agent in what is remembered.
+        Row of the agent in the memory.
     weights : MissionWeights
     """
     own = room.situation.own
@@ -143,7 +143,7 @@ def consider(
 
 @inlined
 def open_tasks(state: MissionArrays, number: int) -> int:
-    """Return how many tasks an agent knows as open."""
+    """Return the number of tasks that an agent knows to be open."""
     found = 0
     for task in range(len(state.tasks)):
         found += (state.task_hour[number, task] >= 0) & (state.task_left[number, task] >= 0)
@@ -152,7 +152,7 @@ def open_tasks(state: MissionArrays, number: int) -> int:
 
 @inlined
 def is_busy(state: MissionArrays, number: int) -> bool:
-    """Return whether an agent has a task that is open as far as it knows, or is on its way to look around."""
+    """Return whether an agent has a task that is open to its knowledge, or is flying to explore."""
     agent = state.agents[number]
     if agent.order == TO_TASK:
         return bool(state.task_left[agent.known, agent.order_task] >= 0)
@@ -161,14 +161,14 @@ def is_busy(state: MissionArrays, number: int) -> bool:
 
 @inlined
 def note_choice(room: Room, row: int, choice: int) -> None:
-    """Note whether a choice is another than the last order, which is news for others."""
+    """Record news for other agents if a choice differs from the last order."""
     if max(choice, NOBODY) != int(room.situation.own[TARGET]):
         room.news[row] = 1
 
 
 @compiled_in_place
 def talk(state: MissionArrays, room: Room) -> None:
-    """Say which agents send a message now."""
+    """Set which agents send a message now."""
     head = state.head[0]
     for number in range(len(state.agents)):
         agent = state.agents[number]
@@ -179,7 +179,7 @@ def talk(state: MissionArrays, room: Room) -> None:
 
 @inlined
 def act(state: MissionArrays, room: Room, number: int, choice: int) -> None:
-    """Give the agent the order that its choice needs."""
+    """Give the agent the order for its choice."""
     agent = state.agents[number]
     nowhere = (0.0, 0.0, 0.0)
     note_choice(room, number, choice)
@@ -193,7 +193,7 @@ def act(state: MissionArrays, room: Room, number: int, choice: int) -> None:
 
 @inlined
 def wants(state: MissionArrays, room: Room, number: int) -> bool:
-    """Return whether an agent is to consider its options now; what it sees is noticed."""
+    """Return whether an agent should consider its options now; record what it sees."""
     head, agent = state.head[0], state.agents[number]
     tasks = open_tasks(state, agent.known)
     is_considered = is_due(room, number, head.hour, head.period, tasks, is_busy(state, number))
@@ -209,16 +209,16 @@ def wants(state: MissionArrays, room: Room, number: int) -> bool:
 
 @compiled_in_place
 def play(state: MissionArrays, room: Room, weights: MissionWeights, seed: int) -> int:
-    """Let the network lead all agents to the end of a mission; return how often options were scored.
+    """Let the network decide for all agents until the end of a mission; return the number of decisions.
 
     Parameters
     ----------
     state : MissionArrays
     room : Room
-        As `room_for` makes it.
+        Workspace from `room_for`.
     weights : MissionWeights
     seed : int
-        Of the run.
+        Seed of the run.
     """
     head, considered = state.head[0], 0
     sensing = head.sensing if head.is_local else np.inf

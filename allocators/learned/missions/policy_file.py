@@ -19,7 +19,7 @@ POLICY_FORMAT = "alloc-mission-policy/1"
 
 SHIPPED = Path(__file__).parents[1] / "files" / "policies" / "missions.safetensors"
 SHIPPED_PPO = SHIPPED.with_name("missions-ppo.safetensors")
-"""The policies that are used where none is given."""
+"""The policies that are used if none is given."""
 
 
 def save_network(
@@ -34,7 +34,7 @@ def save_network(
     method : str
         The method that trained it.
     training : mapping, optional
-        Figures of the training, for information.
+        Figures of the training, stored as informational metadata.
     """
     tensors = {name: weight.contiguous() for name, weight in network.state_dict().items()}
     metadata = {
@@ -52,8 +52,8 @@ def load_network(path: Path | str | None = None) -> MissionNetwork:
     Raises
     ------
     InputError
-        If the file cannot be read, is not for missions, has other features or sizes than this version, or weights that
-        are not finite.
+        If the file cannot be read, is not for missions, has features or sizes that differ from those of this version,
+        or contains weights that are not finite.
     """
     path = SHIPPED if path is None else path
     source, metadata = str(path), read_header(path)

@@ -1,4 +1,4 @@
-"""Missions led by samples of the network in compiled loops, each decision recorded."""
+"""Missions with decisions sampled from the network and recorded, in compiled loops."""
 
 import math
 from typing import NamedTuple
@@ -15,31 +15,32 @@ from alloc.allocators.runtime.compiled import compiled_in_place
 from alloc.problems.fields import FloatArray, IntArray
 
 SAMPLING = 12
-"""What chances are for, as `alloc.problems.missions.chance` counts."""
+"""Purpose of the random numbers, see `alloc.problems.missions.chance`."""
 
 MISSED_COST = 3.0
 """Cost of missing all priority, in ideal mission times."""
 
 
 class Record(NamedTuple):
-    """Decisions of a mission in the order of time.
+    """Decisions of a mission in chronological order.
 
     Attributes
     ----------
     options : ndarray, shape (most, options, FEATURES)
     choices, action, agent : ndarray of int, shape (most,)
-        Options of each decision, the one that was taken, and whose decision it was.
+        Number of options of each decision, the option chosen, and the agent.
     log_probability, hour : ndarray, shape (most,)
     cost : ndarray, shape (most,)
-        Up to then: hours in which agents did not work, the mean by ability, with what missed tasks cost.
+        Cost until then: hours in which agents did not work, as a mean weighted by ability, plus the cost of missed
+        tasks.
     length : ndarray of int, shape (1,)
-        Decisions.
+        Number of decisions.
     asked : ndarray, shape (n,)
-        Hour at which each agent was last asked.
+        Hour of each agent's last decision.
     is_working : ndarray of bool, shape (n,)
         Whether it has worked since.
     total : ndarray, shape (2,)
-        Cost of the mission up to now, and its ideal time.
+        Cost of the mission so far, and its ideal time.
     """
 
     options: Singles
@@ -56,7 +57,7 @@ class Record(NamedTuple):
 
 
 def record_for(n: int, m: int, most: int, ideal: float) -> Record:
-    """Return room for so many decisions of n agents on m tasks in a mission of some ideal time."""
+    """Return storage for up to `most` decisions of n agents on m tasks in a mission with this ideal time."""
     return Record(
         options=np.zeros((most, m + 2, FEATURES), np.float32),
         choices=np.zeros(most, np.intp),
@@ -74,7 +75,7 @@ def record_for(n: int, m: int, most: int, ideal: float) -> Record:
 
 @compiled_in_place
 def account(state: MissionArrays, record: Record, number: int) -> None:
-    """Count the hours since an agent was last asked, if it did not work."""
+    """Add the hours since an agent's last decision to the cost if it did not work."""
     head, agent = state.head[0], state.agents[number]
     if record.asked[number] >= 0 and record.is_working[number] == 0:
         hours = head.hour - record.asked[number]
@@ -87,7 +88,7 @@ def account(state: MissionArrays, record: Record, number: int) -> None:
 
 @compiled_in_place
 def missed_cost(state: MissionArrays, ideal: float) -> float:
-    """Return what tasks cost that are missed by now."""
+    """Return the cost of the tasks missed so far."""
     missed = total = 0.0
     for number in range(len(state.tasks)):
         task = state.tasks[number]
@@ -98,7 +99,7 @@ def missed_cost(state: MissionArrays, ideal: float) -> float:
 
 @compiled_in_place
 def sample(room: Room, count: int, key: int) -> tuple[int, float]:
-    """Return an option that is drawn by the softmax of the scores, and the logarithm of its probability."""
+    """Draw an option from the softmax of the scores; return it and its log-probability."""
     highest, chosen = -np.inf, 0
     largest = room.scores[np.argmax(room.scores[:count])]
     total = 0.0
@@ -112,7 +113,7 @@ def sample(room: Room, count: int, key: int) -> tuple[int, float]:
 
 @compiled_in_place
 def rollout(state: MissionArrays, room: Room, weights: MissionWeights, seed: int, record: Record) -> None:
-    """Let samples of the network lead all agents to the end of a mission, and record what they decide.
+    """Sample the decisions of all agents from the network until the end of a mission, and record them.
 
     Parameters
     ----------
@@ -120,9 +121,9 @@ def rollout(state: MissionArrays, room: Room, weights: MissionWeights, seed: int
     room : Room
     weights : MissionWeights
     seed : int
-        Of the run, the samples included.
+        Seed of the run and of the samples.
     record : Record
-        As `record_for` makes it; when it is full, decisions are no longer recorded.
+        Record from `record_for`; when it is full, decisions are no longer recorded.
     """
     head = state.head[0]
     sensing = head.sensing if head.is_local else np.inf

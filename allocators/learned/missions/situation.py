@@ -1,4 +1,4 @@
-"""What an agent knows when it decides, in arrays: the same from a compiled mission and from a view of the reference."""
+"""An agent's knowledge at a decision as arrays, the same from a compiled mission and from a view of the reference."""
 
 from typing import NamedTuple
 
@@ -11,28 +11,28 @@ from alloc.allocators.runtime.compiled import compiled_in_place, inlined
 from alloc.problems.fields import BoolArray, FloatArray, IntArray
 
 MEMORY = 20
-"""Radio periods after which what was heard of others no longer counts, whatever the unit of time."""
+"""Number of radio periods after which reports on other agents are ignored."""
 
 
 class Coming(NamedTuple):
-    """Who comes to which task, as `expect` finds it.
+    """The agents that come to each task, as determined by `expect`.
 
     Attributes
     ----------
     first : ndarray of int, shape (m,)
-        Who is first at each task, or was there before, -1 for nobody.
+        First agent at each task, -1 for none.
     following : ndarray of int, shape (n,)
-        Who comes to the same task next, -1 for nobody.
+        Next agent that comes to the same task, -1 for none.
     others : ndarray of int, shape (m,)
-        Others at each task or on their way.
+        Number of other agents at each task or on their way to it.
     without : ndarray, shape (m,)
-        Hour at which they have done it, ``inf`` where nobody comes.
+        Hour at which these complete the task, ``inf`` if there are none.
     idle : ndarray of int, shape (n,)
-        Others that have no task.
+        Other agents without a task.
     last, working : ndarray of int, shape (m,)
-        Who is last at each task to which somebody comes, and who last of those that work there already.
+        Last agent that comes to each task, and last of those that already work there.
     idle_places, task_places : ndarray, shape (3, n) and (3, m)
-        Where these others are, and the tasks of the options.
+        Positions of the agents without a task, and of the tasks of the options.
     """
 
     first: IntArray
@@ -47,26 +47,26 @@ class Coming(NamedTuple):
 
 
 class Situation(NamedTuple):
-    """What one agent knows of tasks and of other agents.
+    """Knowledge of one agent of itself, tasks and other agents.
 
     Attributes
     ----------
     own : ndarray, shape (OWN,)
-        Of the agent itself, by the numbers below.
+        Figures of the agent itself, by the indices below.
     task : ndarray, shape (TASK, m)
-        Of each task, by the numbers below.
+        Figures of each task, by the indices below.
     can : ndarray of bool, shape (m,)
-        Whether the agent knows it as open, and can take it.
+        Whether the agent knows the task to be open, and can take it.
     other : ndarray, shape (OTHER, n)
-        Of each other agent that counts, by the numbers below.
+        Figures of each other agent that counts, by the indices below.
     target : ndarray of int, shape (n,)
-        Task to which it goes or where it works, -1 for none.
+        Task to which another agent goes or at which it works, -1 for none.
     counts : ndarray of bool, shape (n,)
-        Whether anything recent is known of an agent, and it is another one.
+        Whether the entry is another agent with a recent report.
     others : ndarray of int, shape (1,)
-        Rows on other agents that are filled in, from the first one on; those behind them count for nothing.
+        Number of entries of other agents in use; further ones are ignored.
     coming : Coming
-        Room for what follows from all that.
+        Workspace for derived figures.
     """
 
     own: FloatArray
@@ -81,21 +81,22 @@ class Situation(NamedTuple):
 
 HOUR, X, Y, Z, ABILITY, SPEED, BATTERY, ENERGY_PER_DISTANCE, SPAN = range(9)
 TARGET, IS_WORKING, IS_FLYING, METRIC, OWN = range(9, 14)
-"""Of the agent; `SPAN` is the longest distance in the area, `TARGET` the task of its order, -1 for none."""
+"""Indices of the agent's own figures; `SPAN` is the longest distance in the area, `TARGET` the task of its order, or
+-1."""
 
 EUCLIDEAN_WAYS, MANHATTAN_WAYS, OTHER_WAYS = range(3)
-"""What `METRIC` is: how far places are apart; others than these two cannot be told from coordinates."""
+"""Values of `METRIC`; distances other than these two cannot be computed from coordinates."""
 
 TASK_X, TASK_Y, TASK_Z, LEFT, KNOWN_AT, PRIORITY, DEADLINE, GROWTH, DISTANCE, TASK = range(10)
-"""Of a task; `DISTANCE` is that from the agent."""
+"""Indices of the figures of a task; `DISTANCE` is that from the agent."""
 
 ARRIVES, STRENGTH, OTHER_X, OTHER_Y, OTHER_Z, PACE, CHARGE, PRICE, HEARD, IS_FREE, OTHER = range(11)
-"""Of another agent: hour at which it is at its task, ability, place, speed, battery, energy per distance, the hour when
-that was true, and whether it was idle."""
+"""Indices of the figures of another agent: arrival hour at its task, ability, position, speed, battery, energy per
+distance, hour of the report, and whether it was idle."""
 
 
 def empty(n: int, m: int) -> Situation:
-    """Return room for a situation."""
+    """Return an empty situation."""
     return Situation(
         own=np.zeros(OWN),
         task=np.zeros((TASK, m)),
@@ -120,7 +121,7 @@ def empty(n: int, m: int) -> Situation:
 
 @compiled_in_place
 def fill(state: MissionArrays, number: int, situation: Situation) -> None:
-    """Fill in what an agent knows in a compiled mission."""
+    """Write an agent's knowledge in a compiled mission."""
     fill_own(state, number, situation.own)
     fill_tasks(state, number, situation.task, situation.can)
     fill_others(state, number, situation, MEMORY * state.head[0].period)
@@ -128,7 +129,7 @@ def fill(state: MissionArrays, number: int, situation: Situation) -> None:
 
 @compiled_in_place
 def fill_own(state: MissionArrays, number: int, own: FloatArray) -> None:
-    """Fill in what an agent knows of itself."""
+    """Write an agent's knowledge of itself."""
     head, agent = state.head[0], state.agents[number]
     own[HOUR] = head.hour
     own[X], own[Y], own[Z] = place_of(agent, head.hour)
@@ -142,7 +143,7 @@ def fill_own(state: MissionArrays, number: int, own: FloatArray) -> None:
 
 @compiled_in_place
 def fill_tasks(state: MissionArrays, number: int, task: FloatArray, can: BoolArray) -> None:
-    """Fill in what an agent knows of tasks."""
+    """Write an agent's knowledge of tasks."""
     head, agent = state.head[0], state.agents[number]
     here, battery = place_of(agent, head.hour), battery_of(agent, head.hour)
     hours, left, allowed = state.task_hour[agent.known], state.task_left[agent.known], state.allowed[number]
@@ -162,13 +163,13 @@ def fill_tasks(state: MissionArrays, number: int, task: FloatArray, can: BoolArr
 
 @inlined
 def does_count(report: Report, who: int, number: int, hour: float, memory: float) -> bool:
-    """Whether what an agent knows of another counts: heard at most `memory` hours ago, of one that takes orders."""
+    """Return whether a report on another agent counts: at most `memory` hours old, and the agent takes orders."""
     return who != number and hour - report.hour <= memory and IDLE <= report.status <= WORKING
 
 
 @compiled_in_place
 def fill_others(state: MissionArrays, number: int, situation: Situation, memory: float) -> None:
-    """Fill in what an agent knows of others, by what it heard at most `memory` hours ago; only those that count."""
+    """Write an agent's knowledge of the other agents that count, with reports at most `memory` hours old."""
     head, row, found = state.head[0], state.agents[number].known, 0
     known, task_hours = state.known_report[row], state.task_hour[row]
     other, target, counts = situation.other, situation.target, situation.counts
@@ -190,7 +191,7 @@ def fill_others(state: MissionArrays, number: int, situation: Situation, memory:
 
 @compiled_in_place
 def clear_others(situation: Situation, found: int) -> None:
-    """Let only the first rows on other agents count."""
+    """Mark only the first `found` entries of other agents as in use."""
     for place in range(found, situation.others[0]):
         situation.counts[place] = False
     situation.others[0] = found

@@ -1,28 +1,28 @@
-"""When an agent sends: every radio period, or seldom, and then sooner where it has news; compiled."""
+"""Compiled rule for when an agent sends a message: in every radio period, or less often and sooner if it has news."""
 
 from alloc.allocators.runtime.compiled import compiled_in_place
 from alloc.problems.fields import IntArray
 
 MOST_SAVED = 3
-"""Messages for which an agent saves up periods at the most."""
+"""Maximum number of messages for which an agent saves up radio periods."""
 
 
 @compiled_in_place
 def is_to_send(periods: int, saved: IntArray, counted: IntArray, news: IntArray, row: int, tick: int) -> bool:
-    """Return whether an agent sends now; what is remembered of that is brought up to date.
+    """Return whether an agent sends a message now, and update its state.
 
     Parameters
     ----------
     periods : int
-        Radio periods that an agent saves up for each message; 1 to send every period. One message is kept back for when
-        it has news.
+        Number of radio periods that an agent saves up for each message; 1 to send in every period. One message is
+        reserved for news.
     saved, counted, news : ndarray of int, shape (agents,)
-        Periods saved up to the tick that was counted last, at first those of as many messages as it can save up for;
-        whether its order has changed since its last message.
+        Periods saved up, initially for the maximum number of messages; tick until which they are counted; and whether
+        the agent's order has changed since its last message.
     row : int
-        Of the agent in these.
+        Index of the agent in these arrays.
     tick : int
-        Periods since hour 0.
+        Number of periods since hour 0.
     """
     if periods == 1:
         return True

@@ -1,4 +1,4 @@
-"""All agents decide in turn, each as it would alone, where all know the same: what they share is worked out once."""
+"""Decisions of all agents in turn with common knowledge: the same as single ones, with shared parts computed once."""
 
 from typing import NamedTuple
 
@@ -26,32 +26,32 @@ from alloc.allocators.runtime.compiled import compiled_in_place, inlined
 from alloc.problems.fields import BoolArray, FloatArray, IntArray
 
 NOT_DUE = -3
-"""Choice of an agent that does not consider its options: its last order stands."""
+"""Choice of an agent that does not consider its options, and keeps its last order."""
 
 
 class Together(NamedTuple):
-    """What all agents know, and what each knows of itself.
+    """The common knowledge of all agents, and that of each of itself.
 
     Attributes
     ----------
     room : Room
-        Its situation is that of the agent whose turn it is: all others count.
+        Workspace, whose situation is that of the agent whose turn it is; all others count.
     own : ndarray, shape (n, OWN)
     ways : ndarray, shape (n, m)
         Distance of each agent from each task.
     can : ndarray of bool, shape (n, m)
     gaps : ndarray, shape (m, n)
-        Distance of each task from the agents that have none, in the first columns; its square by straight lines.
+        Distances of each task from the agents without a task, in the first columns; Euclidean ones are squared.
     idle : ndarray of int, shape (n + 1,)
-        Those agents by column; last, how many they are.
+        These agents by column; the last entry is their number.
     column : ndarray of int, shape (n,)
-        Where an agent is among them, -1 if it is not.
+        Column of each agent, -1 if it has a task.
     crowding : ndarray, shape (m, features)
-        How much work there is near each task; one column is used.
+        Amount of work near each task; one column is used.
     crowded : ndarray of bool, shape (m,)
-        The tasks for which that holds: those that an agent can take.
+        The tasks to which `crowding` applies, which an agent can take.
     abilities : ndarray, shape (1,)
-        Sum of those of all agents.
+        Sum of the abilities of all agents.
     """
 
     room: Room
@@ -67,7 +67,7 @@ class Together(NamedTuple):
 
 
 def together_for(n: int, m: int) -> Together:
-    """Return room for n agents and m tasks."""
+    """Return a workspace for n agents and m tasks."""
     room = room_for(n, m)
     return Together(
         room=room,
@@ -85,7 +85,7 @@ def together_for(n: int, m: int) -> Together:
 
 @compiled_in_place
 def meet(together: Together) -> None:
-    """Work out what all share, when `own`, `ways`, `can` and the tasks of the situation are filled in."""
+    """Compute the shared parts from `own`, `ways`, `can` and the tasks of the situation."""
     situation, own = together.room.situation, together.own
     other = situation.other
     together.crowded[:] = False
@@ -103,7 +103,7 @@ def meet(together: Together) -> None:
 
 @compiled_in_place
 def note_idle(together: Together, i: int) -> None:
-    """Put an agent among those that have no task, or take it from them, by its target."""
+    """Add an agent to those without a task, or remove it, depending on its target."""
     own, situation, gaps, column = together.own[i], together.room.situation, together.gaps, together.column
     tasks, idle, is_manhattan = situation.task, together.idle, own[known.METRIC] == known.MANHATTAN_WAYS
     has_none, place = situation.target[i] == NOBODY, column[i]
@@ -127,7 +127,7 @@ def note_idle(together: Together, i: int) -> None:
 
 @compiled_in_place
 def arrival(together: Together, i: int, task: int) -> float:
-    """Return the hour at which an agent is at a task; ``-inf`` where it works there."""
+    """Return the arrival hour of an agent at a task; ``-inf`` if it works there."""
     own = together.own[i]
     if task == NOBODY or (own[known.IS_WORKING] > 0 and own[known.TARGET] == task):
         return -np.inf
@@ -136,18 +136,18 @@ def arrival(together: Together, i: int, task: int) -> float:
 
 @compiled_in_place
 def decide_together(together: Together, weights: MissionWeights, turns: IntArray, period: float, tasks: int) -> None:
-    """Let agents decide in turn; each knows what those before it chose.
+    """Let agents decide in turn, each knowing the choices of those before it.
 
     Parameters
     ----------
     together : Together
     weights : MissionWeights
     turns : ndarray of int
-        Their numbers; in their place come their choices: a task, `WAIT` or `NOT_DUE`.
+        Indices of the agents; replaced by their choices: a task, `WAIT` or `NOT_DUE`.
     period : float
-        Hours between two messages, in which the time until options are considered anew is counted.
+        Hours between two messages, the unit of the time until options are reconsidered.
     tasks : int
-        How many are open.
+        Number of open tasks.
     """
     room = together.room
     for turn in range(len(turns)):
@@ -168,7 +168,7 @@ def decide_together(together: Together, weights: MissionWeights, turns: IntArray
 
 @compiled_in_place
 def step_out(together: Together, i: int, target: int) -> None:
-    """Let an agent be none of those that others know, as it is its turn."""
+    """Remove an agent from the others, as it is its turn."""
     situation = together.room.situation
     situation.counts[i] = False
     if target == NOBODY:
@@ -190,7 +190,7 @@ def step_out(together: Together, i: int, target: int) -> None:
 
 @compiled_in_place
 def step_in(together: Together, i: int, target: int) -> None:
-    """Let others know where an agent goes."""
+    """Add an agent to the others again, with its target."""
     situation = together.room.situation
     situation.counts[i], situation.target[i] = True, target
     note_idle(together, i)
@@ -203,14 +203,14 @@ def step_in(together: Together, i: int, target: int) -> None:
 
 @compiled_in_place
 def renew(situation: Situation, task: int) -> None:
-    """Work out anew when a task is done."""
+    """Recompute when a task is done."""
     coming = situation.coming
     coming.others[task], coming.without[task] = done_without(situation, task)
 
 
 @compiled_in_place
 def fill_turn(together: Together, i: int) -> int:
-    """Fill in the options of an agent, as `fill_options` does; return how many there are."""
+    """Write the options of an agent, as `fill_options` does; return the number of options."""
     room, situation = together.room, together.room.situation
     for number in range(known.OWN):
         situation.own[number] = together.own[i, number]
@@ -243,7 +243,7 @@ def fill_turn(together: Together, i: int) -> int:
 
 @inlined
 def nearer(together: Together, i: int, task: int) -> float:
-    """Return how many others that have no task are nearer to one than an agent."""
+    """Return how many other agents without a task are nearer to a task than an agent."""
     gaps, limit, found = together.gaps[task], together.ways[i, task], 0
     if together.own[i, known.METRIC] != known.MANHATTAN_WAYS:
         limit = limit**2

@@ -1,1 +1,1 @@
-"""Training of networks for missions: curriculum, PPO, validation, and a population that is bred."""
+"""Training of networks for missions: curriculum, PPO, validation and breeding."""

@@ -1,4 +1,4 @@
-"""The missions of training: of many families, sizes, radii and losses, and harder as training goes on."""
+"""Training missions of many families, sizes, radii and losses, which become more varied in the course of training."""
 
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -14,25 +14,25 @@ from alloc.problems.missions.mission import Mission
 from alloc.problems.vocabulary import MissionFamily
 
 FAMILIES = tuple(str(family) for family in MissionFamily if not str(family).startswith("paper"))
-"""Families of missions to train on."""
+"""Families of training missions."""
 
 VALIDATION_SEED = 1_000_000_000
-"""Seeds from here on are those of validation missions."""
+"""First seed of validation missions."""
 
 VALIDATION_SIZES = ((20, 40), (40, 80), (10, 40), (60, 40))
-"""Agents and tasks of validation missions, in turn."""
+"""Numbers of agents and tasks of validation missions, used in turn."""
 
 
 class PackedMission(NamedTuple):
-    """A mission that is ready for compiled runs.
+    """A mission prepared for compiled runs.
 
     Attributes
     ----------
     arrays : MissionArrays
     ideal : float
-        Hours that all agents together would need for all work if flights took no time.
+        Ideal mission time: hours that all agents together would need for all work if flights took no time.
     periods : int
-        Radio periods for each message, see `is_to_send`.
+        Number of radio periods per message, see `is_to_send`.
     """
 
     arrays: MissionArrays
@@ -47,20 +47,20 @@ class MissionCurriculum:
     Attributes
     ----------
     families : tuple of str
-        Those of `MissionFamily` to draw from.
+        Families of `MissionFamily` to draw from.
     agents, tasks : tuple of int
-        Least and most of each.
+        Minimum and maximum numbers of agents and tasks.
     radii : tuple of float
-        Radio radii and sensing radii to draw from, each by itself.
+        Values from which radio radius and sensing radius are drawn independently.
     losses : tuple of float
-        Shares of messages lost.
+        Shares of lost messages to draw from.
     periods : tuple of int
-        Radio periods that agents save up for each message.
+        Numbers of radio periods per message.
     varied_from : float
-        Share of the training after which everything varies; before that, missions of the first family and the first
-        radius and loss alone are drawn.
+        Share of the training after which everything varies; before, only missions of the first family, radius and loss
+        are drawn.
     missions : tuple of Mission
-        To train on instead, if there are any.
+        Training missions in place of drawn ones, if there are any.
     """
 
     families: tuple[str, ...] = FAMILIES
@@ -125,7 +125,7 @@ def _generated(parameters: MissionParameters, seed: int) -> PackedMission:
 
 
 def packed(mission: Mission) -> PackedMission:
-    """Return a mission ready for compiled runs."""
+    """Return a mission prepared for compiled runs."""
     instance = mission.instance
     ideal = float(instance.workload.sum() / instance.ability.sum())
     return PackedMission(pack(mission), max(ideal, 1e-9))

@@ -1,4 +1,4 @@
-"""The linear part of the network and its last layer, evolved: where PPO begins.
+"""Evolution of the linear part of the network and its last layer, from which PPO starts.
 
 References
 ----------
@@ -20,13 +20,13 @@ from alloc.allocators.parallel.engine import Engine
 from alloc.problems.fields import FloatArray
 
 STEP, FINE_STEP = 1.0, 0.3
-"""Initial standard deviation of a weight; the smaller one where a training goes on from a policy."""
+"""Initial standard deviation of a weight, without and with an initial policy."""
 
 EVOLVED = ("skip.weight", "out.weight")
-"""What is evolved: the weights of features, and those of the last layer, whose inputs stay as they were drawn."""
+"""Evolved weights: those of the features, and those of the last layer, whose inputs are fixed random functions."""
 
 STATE = ("centroid", "sigma", "pc", "ps", "C", "diagD", "B", "BD", "update_count")
-"""What changes of DEAP's strategy from generation to generation."""
+"""Attributes of DEAP's strategy that change from generation to generation."""
 
 
 class _Fitness(base.Fitness):  # type: ignore[misc]
@@ -42,7 +42,7 @@ class _Rule(list[float]):
 
 
 class RuleJob(NamedTuple):
-    """A candidate, and the missions on which it is tried, as they are sent to wherever that is done."""
+    """A candidate and the missions on which it is evaluated, in a form that can be sent to another process."""
 
     network: Weights
     rule: list[float]
@@ -53,7 +53,7 @@ class RuleJob(NamedTuple):
 
 
 def try_rule(job: RuleJob) -> float:
-    """Return the cost of missions under a candidate: a pure function of the job."""
+    """Return the cost of missions under a candidate; a pure function of the job."""
     network = MissionNetwork()
     network.load_state_dict(with_rule(job.network, job.rule))
     drawn = job.curriculum.draw(np.random.default_rng(job.seed), job.missions, job.progress)
@@ -61,7 +61,7 @@ def try_rule(job: RuleJob) -> float:
 
 
 def with_rule(network: Weights, rule: Sequence[float]) -> Weights:
-    """Return the weights of a network with other ones where they are evolved."""
+    """Return the weights of a network with the evolved ones replaced."""
     parts = torch.tensor(list(rule), dtype=torch.float32).split([network[name].numel() for name in EVOLVED])
     return {**network, **{name: part[None] for name, part in zip(EVOLVED, parts, strict=True)}}
 
@@ -72,11 +72,11 @@ class Evolution:
     Parameters
     ----------
     network : weights
-        Of the network that begins.
+        Weights of the initial network.
     population : int
-        Candidates in a generation.
+        Number of candidates in a generation.
     missions : int
-        On which all candidates of a generation are compared.
+        Number of missions on which all candidates of a generation are compared.
     step : float
         Initial standard deviation of a weight.
     """
@@ -95,11 +95,11 @@ class Evolution:
         ----------
         curriculum : MissionCurriculum
         seed : int
-            Of all random numbers.
+            Seed of all random numbers.
         progress : float
             Share of the training that is done, 0 to 1.
         engine : Engine
-            Where candidates are tried.
+            Engine that evaluates the candidates.
         should_stop : callable
         """
         strategy, rng = self._strategy, np.random.default_rng(seed)
@@ -114,7 +114,7 @@ class Evolution:
         return with_rule(self._network, strategy.centroid.tolist())
 
     def state_dict(self) -> dict[str, torch.Tensor]:
-        """Return what changes from generation to generation."""
+        """Return the state that changes from generation to generation."""
         return {name: torch.tensor(value) for name, value in state_of(self._strategy).items()}
 
     def load_state_dict(self, state: dict[str, torch.Tensor]) -> None:
@@ -123,7 +123,7 @@ class Evolution:
 
 
 def state_of(strategy: cma.Strategy) -> dict[str, FloatArray]:
-    """Return what changes of a strategy from generation to generation."""
+    """Return the attributes of a strategy that change from generation to generation."""
     return {name: np.array(getattr(strategy, name)) for name in STATE}
 
 

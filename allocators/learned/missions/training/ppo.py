@@ -1,8 +1,8 @@
-"""PPO in missions: agents' decisions, as they come, under one network.
+"""PPO in missions, with one network for the asynchronous decisions of all agents.
 
-Each mission is played several times, with the same events and the same luck of the radio. The advantage of a decision
-is how much less all agents lost soon after it than in the other plays in the same hours. A critic in place of the
-other plays explained 0.02 to 0.28 of the variance, and under it mission times did not improve.
+Each mission is played several times, with the same events and the same random losses of messages. The advantage of a
+decision is the reduction of the cost of all agents soon after it, relative to the other plays in the same hours. A
+critic in place of the other plays explained 0.02 to 0.28 of the variance, and did not improve mission times.
 
 References
 ----------
@@ -30,13 +30,13 @@ from alloc.allocators.missions.pack import begun
 from alloc.problems.fields import FloatArray
 
 PLAYS = 6
-"""Plays of each mission."""
+"""Number of plays of each mission."""
 
 WINDOW = 0.35
-"""Hours after a decision in which losses count, in ideal mission times."""
+"""Time after a decision in which costs count, in ideal mission times."""
 
 MOST_DECISIONS = 3000
-"""Decisions of a mission that are learned from."""
+"""Maximum number of decisions of a mission used for learning."""
 
 
 class MissionSamples(NamedTuple):
@@ -76,16 +76,16 @@ class MissionPpo:
     def train_on(
         self, curriculum: MissionCurriculum, seed: int, decisions: int, missions: int, progress: float
     ) -> MissionStats:
-        """Play missions with an update after each few of them, until so many decisions are made.
+        """Play missions, with an update after every `missions` of them, until `decisions` decisions are made.
 
         Parameters
         ----------
         curriculum : MissionCurriculum
         seed : int
-            Of all random numbers.
+            Seed of all random numbers.
         decisions : int
         missions : int
-            Between two updates; each is played `PLAYS` times.
+            Number of missions between two updates; each is played `PLAYS` times.
         progress : float
             Share of the training that is done, 0 to 1.
         """
@@ -103,7 +103,7 @@ class MissionPpo:
         return MissionStats(done, cost, entropy, approx_kl)
 
     def _play(self, mission: PackedMission, seed: int) -> list[Record]:
-        """Return the plays of a mission, which differ in the samples of decisions only."""
+        """Return the plays of a mission, which differ only in the sampled decisions."""
         n, m = len(mission.arrays.agents), len(mission.arrays.tasks)
         weights, records = compiled_weights(self.network), []
         for play in range(PLAYS):
@@ -170,12 +170,12 @@ class MissionPpo:
 
 
 def group_advantages(group: list[Record]) -> list[FloatArray]:
-    """Return what each decision in some plays of a mission gained beside the other plays, in ideal mission times.
+    """Return the advantage of each decision over the other plays of a mission, in ideal mission times.
 
     Parameters
     ----------
     group : list of Record
-        Of plays that are over, at least two.
+        Records of at least two completed plays.
     """
     gained = []
     for record in group:
@@ -188,7 +188,7 @@ def group_advantages(group: list[Record]) -> list[FloatArray]:
 
 
 def _lost_after(record: Record, hours: FloatArray, window: float) -> FloatArray:
-    """Return what was lost in a play after each of some hours."""
+    """Return the cost of a play within `window` after each of the hours."""
     length = int(record.length[0])
     at = np.append(record.hour[:length], record.asked.max())
     cost = np.append(record.cost[:length], record.total[0])

@@ -1,4 +1,4 @@
-"""Training in missions as a function: what `alloc train --missions` does, for programs."""
+"""Training in missions as a function, equivalent to `alloc train --missions`."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -19,10 +19,10 @@ from alloc.problems.errors import nearest
 from alloc.problems.missions.mission import Mission
 
 DEFAULT_GENERATIONS = 150
-"""Generations where no limit is given."""
+"""Number of generations if no limit is given."""
 
 DEFAULT_POPULATION = 4
-"""Networks of `gappo`; `ppo` trains one."""
+"""Number of networks of `gappo`; `ppo` trains one."""
 
 
 def train_on_missions(
@@ -49,18 +49,19 @@ def train_on_missions(
     on_start: Callable[[MissionTrainer, Limits], None] = lambda trainer, limits: None,
     on_report: Callable[[Report], None] = lambda report: None,
 ) -> MissionTrainer:
-    """Train a network for missions, and write the best one up to now after each generation.
+    """Train a network for missions, and write the best one so far after each generation.
 
     Parameters
     ----------
     method : {"gappo", "ppo"}
-        Evolution, and then a population that learns by PPO and is bred; or a single network that learns by PPO.
+        ``gappo``: evolution, followed by a population that learns by PPO and is bred; ``ppo``: one network that learns
+        by PPO.
     output : Path or str
         Policy file to write.
     families : sequence of str
-        Families of missions to train on, see `MissionFamily`; ``mixed`` for all but the paper's.
+        Families of training missions, see `MissionFamily`; ``mixed`` for all except the paper's.
     missions : sequence of Mission
-        Missions to train on instead.
+        Training missions in place of families.
     steps, minutes, iterations, patience, init, population, decisions, seed, resume, checkpoint, log, tensorboard
         As for `train`.
     parameters : mapping, optional
@@ -75,7 +76,7 @@ def train_on_missions(
     Raises
     ------
     InputError
-        If a parameter is out of range, a file cannot be read, or one would be overwritten that is not of this run.
+        If a parameter is out of range, a file cannot be read, or a file of another origin would be overwritten.
     TrainingError
         If the engine gives up; the run can be resumed.
     """
@@ -109,7 +110,7 @@ def train_on_missions(
 
 
 def _learner(parameters: Mapping[str, object]) -> PpoParameters:
-    """Return the hyperparameters of PPO with some of them set."""
+    """Return the default hyperparameters of PPO in missions with changes by `parameters`."""
     from alloc.allocators.learned.algorithms.registry import method_parameters
 
     given = method_parameters("ppo", parameters)

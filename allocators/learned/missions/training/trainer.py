@@ -37,30 +37,30 @@ DEFAULT_PPO = PpoParameters(
     target_kl=0.012,
     minibatch_size=1024,
 )
-"""Hyperparameters of PPO in missions; at a tenth of the rate the policy hardly moves (divergence below 1e-4)."""
+"""Hyperparameters of PPO in missions; with a tenth of the rate, the policy hardly changes (divergence below 1e-4)."""
 
 
 @dataclass(frozen=True)
 class MissionTrainingParameters:
-    """Parameters of a training in missions; together with the seed they decide the whole learning curve.
+    """Parameters of a training in missions; together with the seed, they determine the learning curve.
 
     Attributes
     ----------
     method : {"gappo", "ppo"}
     population : int
-        Networks that learn; several are bred between generations.
+        Number of networks that learn; several are bred between generations.
     decisions : int
-        Decisions of agents in a generation, for each network.
+        Decisions of agents per generation and network.
     missions : int
-        Missions on which candidates are compared.
+        Number of missions on which candidates are compared.
     groups : int
-        Missions between two updates of PPO.
+        Number of missions between two updates of PPO.
     validations : int
-        Missions on which networks are compared.
+        Number of missions on which networks are compared.
     evolved : int
-        Generations at the beginning in which scores are evolved; then PPO goes on from there.
+        Number of initial generations of evolution, after which PPO continues.
     candidates : int
-        Of each of those.
+        Number of candidates in each of these generations.
     learner : PpoParameters
     breeding : BreedingParameters
     curriculum : MissionCurriculum
@@ -80,7 +80,7 @@ class MissionTrainingParameters:
 
 
 class MissionJob(NamedTuple):
-    """The training of one member in a generation, as it is sent to wherever it is run."""
+    """The training of one member in a generation, in a form that can be sent to another process."""
 
     parameters: MissionTrainingParameters
     state: StateDict
@@ -90,7 +90,7 @@ class MissionJob(NamedTuple):
 
 
 def train_member(job: MissionJob) -> MemberResult:
-    """Train a member and validate its network: a pure function of the job, wherever it is run."""
+    """Train a member and validate its network; a pure function of the job."""
     parameters = job.parameters
     with plain_torch(), torch_threads(job.threads):
         learner = MissionPpo(parameters.learner)
@@ -153,7 +153,7 @@ class MissionTrainer(PopulationTraining):
         return engine.map(train_member, jobs, should_stop)
 
     def _evolve(self, progress: float, engine: Engine, should_stop: Callable[[], bool]) -> list[MemberResult] | None:
-        """Evolve the scores for a generation; all members then begin with them."""
+        """Evolve the network for a generation; all members then start from it."""
         parameters = self.parameters
         weights = self.evolution.advance(parameters.curriculum, self._mixed_seed(0), progress, engine, should_stop)
         if weights is None:

@@ -1,4 +1,4 @@
-"""Validation of networks in missions that are never trained on."""
+"""Validation of networks in missions that are never used for training."""
 
 from collections.abc import Sequence
 
@@ -12,24 +12,24 @@ from alloc.allocators.missions.layout import DONE, MissionArrays
 from alloc.allocators.missions.pack import begun, records
 
 MISSED_WEIGHT = 3.0
-"""Cost of a mission without any priority done, in ideal mission times."""
+"""Cost of completing no priority in a mission, in ideal mission times."""
 
 DISTANCE_WEIGHT = 0.02
-"""Cost of the distance per agent, in diagonals of the area."""
+"""Cost of the distance per agent, measured in diagonals of the area."""
 
 
 def validate(network: MissionNetwork, missions: list[tuple[PackedMission, int]]) -> Validation:
-    """Return how well a network leads missions.
+    """Return the performance of a network in missions.
 
-    The cost of a mission is the hour at which the last task is done, over the ideal mission time, with what is missed
-    or left, and a little for distance; that of all is the geometric mean, as what counts is per cents of each, large
-    or small. ``unserved`` counts tasks that are not done, and ``reward`` is minus the cost.
+    The cost of a mission is the mission time over the ideal mission time, plus the costs of missed or unfinished tasks
+    and of distance. The total cost is the geometric mean, so that relative changes count equally in all missions.
+    ``unserved`` counts tasks that are not done, and ``reward`` is the negative cost.
 
     Parameters
     ----------
     network : MissionNetwork
     missions : list of (PackedMission, int)
-        And the seeds of their runs.
+        Missions and the seeds of their runs.
     """
     weights, rows = compiled_weights(network), []
     for mission, seed in missions:
@@ -42,7 +42,7 @@ def validate(network: MissionNetwork, missions: list[tuple[PackedMission, int]])
 
 
 def cost_of(rows: Sequence[tuple[float, ...]]) -> float:
-    """Return the cost of missions by the `figures` of each."""
+    """Return the total cost of missions, given the `figures` of each."""
     time, _, undone, distance = np.array(rows).T
     return float(np.exp(np.log(time + MISSED_WEIGHT * undone + DISTANCE_WEIGHT * distance).mean()))
 
