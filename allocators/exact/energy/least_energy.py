@@ -1,4 +1,4 @@
-"""The least energy at a makespan: agents alike to the nearest tasks, both sides of the gap, then the solver."""
+"""The energy stage: exchanges of identical agents, plans and bounds by turns, then the solver."""
 
 import sys
 from contextlib import nullcontext
@@ -16,49 +16,49 @@ from alloc.problems import agent_classes
 from alloc.problems.evaluation import last_equal
 
 SHARE_WITHOUT_SOLVER = 0.3
-"""Share of the time before which the solver does not run."""
+"""Share of the time before the solver may run."""
 
 SHARE_WITHOUT_GROUPS = 0.1
-"""Share of the time before which groups are not counted, as better plans soon make them fewer."""
+"""Share of the time before groups are counted, as better plans soon reduce their number."""
 
 MOST_GROUPS = FEW_GROUPS, 15_000
-"""Groups of tasks up to which, first and then, an integer programme picks among them where bounds rise no more."""
+"""Numbers of groups, tried in turn, up to which an integer programme selects among them if bounds no longer rise."""
 
 SOLVER_GAP = 1e-7
-"""Relative gap that solvers leave by their tolerances."""
+"""Relative gap left by solvers due to their tolerances."""
 
 SMALL_PAIRS = 3000
-"""Pairs of class and task that a better plan may have, up to which the solver comes next even if bounds still rise."""
+"""Number of pairs that a better plan may use, up to which the solver is called even if bounds still rise."""
 
 LATER, MUCH_LATER, MIXING_SHARE, MOST_MIXED = 0.12, 0.3, 0.04, 1500
 """Parts of the time between two attempts to make a plan of groups found so far, after a better plan and else; part of
 the time that an attempt takes, and groups in it, at the most."""
 
 LOCAL_SHARE, LESS_SHARE, MAX_LOCAL_S = 0.7, 0.1, 30.0
-"""Share of the time of local search where nothing else finds plans, and where an annealed search with prices does, and
-seconds at the most."""
+"""Time share of local search if nothing else finds plans, and if the annealing search with prices does; and its maximum
+in seconds."""
 
 SHORT_STAGE_S = 0.6
-"""Length of the stage up to which that search hardly begins, so that local search has its whole share."""
+"""Length of the stage up to which the annealing search hardly starts, so that local search gets its full share."""
 
 SHARE_WITH_PLANS = 0.85
-"""Share of the time up to which that search goes on while it finds plans, unless pairs are too many for the solver."""
+"""Share of the time up to which the annealing search continues while it finds plans, if the solver is tractable."""
 
 
 def least_energy(search: Search, solver: Solver, min_served: int) -> float | None:
-    """Look for the least energy at the makespan of the best plan so far; return a lower bound on it.
+    """Minimise the energy at the makespan of the best plan so far; return a lower bound on it.
 
     Parameters
     ----------
     search : Search
     solver : Solver
     min_served : int
-        How many tasks are to be served.
+        Number of tasks to be served.
 
     Returns
     -------
     float or None
-        Energy that every plan with at most this makespan needs; None if nothing is known.
+        Lower bound on the energy of all plans with at most this makespan; None if unknown.
     """
     assert search.best is not None
     time = last_equal(search.makespan_limit)
@@ -76,7 +76,7 @@ def least_energy(search: Search, solver: Solver, min_served: int) -> float | Non
 
 
 def _least_cost(state: EnergyState, solver: Solver) -> float:
-    """Close the gap from both sides, then by the solver; return what is proven to be needed, in units of distance."""
+    """Close the gap from both sides, then by the solver; return the proven lower bound in units of distance."""
     both, search = state.primal_dual, state.search
     if state.local_search is not None:
         share = LOCAL_SHARE if state.travel is None or state.stage_s < SHORT_STAGE_S else LESS_SHARE
@@ -143,14 +143,14 @@ def _mix_groups(state: EnergyState, both: PrimalDual) -> bool:
 
 
 def _finds_plans(state: EnergyState, both: PrimalDual) -> bool:
-    """Whether the annealed search is to go on: for the solver there are too many pairs, or plans still get better."""
+    """Whether to continue the annealing search: there are too many pairs for the solver, or plans still improve."""
     if state.travel is None or len(both.keep) > SMALL_PAIRS:
         return state.travel is not None
     return state.progress < SHARE_WITH_PLANS and not state.travel.has_stalled(state.stage_s)
 
 
 def _solve_groups(state: EnergyState, both: PrimalDual, groups: GroupProgramme) -> float:
-    """Pick the best of the groups that a better plan may have; return a bound."""
+    """Select the best groups by an integer programme; return a lower bound."""
     search = state.search
     monitor = SolverMonitor(search, state.model, state.demand, state.until_s)
     counts, bound = groups.solve(monitor, search.seed, repeatable=state.repeatable)
@@ -161,7 +161,7 @@ def _solve_groups(state: EnergyState, both: PrimalDual, groups: GroupProgramme) 
 
 
 def _solve_rest(state: EnergyState, solver: Solver) -> Answer:
-    """Give the solver the pairs that a better plan may have; with two threads or more, both sides go on meanwhile."""
+    """Run the solver on pairs that a better plan may use; with two threads or more, both sides continue meanwhile."""
     search, both, demand = state.search, state.primal_dual, state.demand
     assert search.best is not None
     if both is not None:

@@ -1,4 +1,4 @@
-"""Close the gap on the energy from both sides: plans by pairwise repartition, bounds by Lagrangian relaxation."""
+"""Plans by pairwise repartition and bounds by Lagrangian relaxation, to close the gap on the energy from both sides."""
 
 from collections.abc import Callable
 
@@ -19,36 +19,36 @@ from alloc.problems import IDLE, Allocation, Instance
 from alloc.problems.instance import FloatArray, IntArray
 
 STATES = 2000
-"""Cells that count for a pair where weights are no whole numbers."""
+"""Number of table cells assumed for a pair if weights are not integers."""
 
 MAX_TASKS = 2000
-"""Tasks above which neither side is used, for its memory."""
+"""Number of tasks above which neither side is used, because of memory."""
 
 MAX_LEAD_S = 0.1
-"""How much more time one side may have had before it waits for the other."""
+"""Lead in time of one side at which it waits for the other."""
 
 LONG, SHORT_S, STUCK = 1.5, 0.5, 2.0
-"""The search for plans is stuck when its time exceeds so many times that until its best plan, and so many seconds; it
-then gets half of the time of bounds."""
+"""The search for plans is stuck if its time exceeds the first value times that until its best plan, and the second
+value in seconds; it then gets the time of bounds divided by the third."""
 
 MAX_CUT_ROUNDS = 5
-"""Rounds of cutting planes in one call, of which one may take as long as many of subgradients."""
+"""Largest number of rounds of cutting planes in one call, as one may take as long as many rounds of subgradients."""
 
 FEW_GROUPS = 2500
-"""Groups of all tasks up to which an integer programme picks among them while bounds rise."""
+"""Total number of groups up to which an integer programme selects among them while bounds still rise."""
 
 PARTS = 1.0, 0.7, 0.5, 0.35, 0.25
-"""Parts of the gap tried in turn, until the groups within are few enough."""
+"""Shares of the gap that are tried in turn until the number of groups within is small enough."""
 
 LESS_GAP = 0.9
-"""Part of the last gap at which groups are counted again."""
+"""Groups are counted again once the gap is this share of the last one."""
 
 REPEATABLE_SLICES, REPEATABLE_ROUNDS = 60, 10
-"""Slices, and rounds in each, where effort is counted."""
+"""Number of slices, and of rounds per slice, in repeatable runs."""
 
 
 def compile_loops() -> None:
-    """Compile all loops, or read them from the cache, so that no run waits for it."""
+    """Compile all loops, or load them from the cache, so that they do not delay a run."""
     plan = np.array([0, 1])
     plans = PairwiseSearch(plan, np.ones(2, dtype=int), np.ones((2, 2)), np.ones(2, dtype=int), np.zeros((2, 2)), 0)
     plans.descend()
@@ -63,7 +63,7 @@ def compile_loops() -> None:
 
 
 class PrimalDual:
-    """Plans and bounds for the least energy by `model.at(limit)`, all tasks that `plan` serves being served.
+    """Plans and lower bounds for the least energy within `demand`, with all tasks served that `plan` serves.
 
     Parameters
     ----------
@@ -74,9 +74,9 @@ class PrimalDual:
         A plan that meets the demand.
     seed : int
     seconds : float
-        Time limit of the linear programme to begin with.
+        Time limit of the initial linear programme.
     should_stop : callable
-        Asked while cuts are sought, and while groups are counted.
+        Called during the separation of cuts and the enumeration of groups.
     """
 
     def __init__(
@@ -103,18 +103,18 @@ class PrimalDual:
 
     @property
     def bound(self) -> float:
-        """Cost that every plan needs, as far as proven."""
+        """Proven lower bound on the cost of all plans."""
         return min(self._proven * (1 - ROUNDING), self._cost)
 
     @property
     def _proven(self) -> float:
-        """The bound, which may exceed the cost of the best plan by rounding."""
+        """The bound, which may exceed the cost of the best plan by rounding errors."""
         bound = 0.0 if self._dual is None else self._dual.bound
         return bound if self._cuts is None else max(bound, self._cuts.bound)
 
     @property
     def price(self) -> FloatArray | None:
-        """Price of an agent of each class, shape (k,), once prices are nearly the best; None before."""
+        """Price of an agent of each class, shape (k,), once prices are nearly optimal; None before."""
         dual = self._dual if self._dual is not None and self._dual.is_nearly_optimal else None
         return self._cuts.price if self._cuts is not None else None if dual is None else dual.price
 
@@ -125,12 +125,12 @@ class PrimalDual:
 
     @property
     def is_empty(self) -> bool:
-        """Whether there is neither side."""
+        """Whether there is neither a primal nor a dual side."""
         return self._primal is None and self._dual is None
 
     @property
     def closed(self) -> bool:
-        """Whether the best plan is proven."""
+        """Whether the best plan is proven optimal."""
         return self._dual is not None and self._proven >= self._cost * (1 - 1e-9)
 
     @property
@@ -148,7 +148,7 @@ class PrimalDual:
         return self._dual is None or (self._dual.is_rising_slowly and not self._dual.may_be_cut)
 
     def few_groups(self) -> GroupProgramme | None:
-        """Return all groups of which better plans consist where they are few; else None, until the gap is less."""
+        """Return all groups of better plans if they are few; otherwise None, until the gap is less."""
         if self._cuts is None:
             return None
         gap = self._cost - self._cuts.bound
@@ -162,9 +162,9 @@ class PrimalDual:
         return None if self._cuts is None else self._cuts.known_groups(self._cost, most)
 
     def groups_of_cheapest(self, most: int) -> GroupProgramme | None:
-        """Return all groups of which the plans consist that cost less than a part of the gap above the bound.
+        """Return all groups of plans that cost less than the bound plus a share of the gap.
 
-        The part is as large as it can be with at most so many groups; None if even the least has more.
+        The share is the largest one with at most `most` groups; None if even the smallest share has more.
         """
         if self._cuts is None:
             return None
@@ -173,36 +173,36 @@ class PrimalDual:
         return next((groups for groups in tried if groups is not None), None)
 
     def allocation(self, programme: GroupProgramme, counts: IntArray) -> Allocation:
-        """Turn numbers of agents of the pairs of a programme of groups into an allocation."""
+        """Return the allocation with these numbers of agents of the programme's pairs."""
         full = np.zeros(len(self._demand.class_of_pair), dtype=np.intp)
         full[self._kept] = counts
         return self._model.allocation(self._demand, full)
 
     @property
     def keep(self) -> IntArray:
-        """Which pairs of the demand a better plan may have, sorted."""
+        """Pairs of the demand that a better plan may use, sorted."""
         return np.sort(self._kept)
 
     @property
     def _kept(self) -> IntArray:
-        """Pairs of the demand that the dual side has kept, in its order."""
+        """Pairs of the demand that the dual side has kept, in the order of its model."""
         kept = self._pairs if self._dual is None else self._pairs[self._dual.kept]
         return kept if self._cuts is None else kept[self._cuts.kept]
 
     def run(self, progress: float, pool: Pool | None) -> Allocation | None:
-        """Work on both sides for some 10 ms each; return a plan if a better one was found.
+        """Run both sides for some 10 ms each; return a plan if a better one was found.
 
         Parameters
         ----------
         progress : float
-            How much of the time has passed, from 0 to 1.
+            Share of the time that has passed, from 0 to 1.
         pool : Pool or None
-            Works on one side while the calling thread works on the other.
+            Runs one side while the calling thread runs the other.
         """
         if not self._descended:
             return self._descend()
         rising = None if pool is None else pool.submit(self._ascend)
-        lead_s = self._lead_s  # rounds of either side may take long
+        lead_s = self._lead_s  # a round of either side may take long
         if self._primal is not None and (lead_s <= MAX_LEAD_S or rising is not None):
             primal = self._primal
             self._primal_timer.run(lambda rounds: primal.anneal(rounds, progress))
@@ -214,13 +214,13 @@ class PrimalDual:
 
     @property
     def _lead_s(self) -> float:
-        """By how much the search for plans has had more time than is due to it."""
+        """Seconds by which the search for plans is ahead of its share."""
         spent_s = self._primal_timer.spent_s
         is_stuck = spent_s > LONG * self._improved_s + SHORT_S
         return spent_s * (STUCK if is_stuck else 1.0) - self._dual_timer.spent_s
 
     def repeat(self, slice_: int) -> Allocation | None:
-        """Work on both sides as `run` does, by count and not by the clock."""
+        """Run both sides as `run` does, with effort counted rather than timed."""
         if not self._descended:
             return self._descend()
         if self._primal is not None:
@@ -229,7 +229,7 @@ class PrimalDual:
         return self._better()
 
     def note_plan(self, plan: Allocation, cost: float) -> None:
-        """Take note of a plan that was submitted, and of its cost."""
+        """Record a submitted plan and its cost."""
         if cost <= self._cost:
             is_better = cost < self._cost * (1 - 1e-9)
             self._plan, self._cost = plan, cost
@@ -239,7 +239,7 @@ class PrimalDual:
                 self._cuts.note_plan(self._counts[self._dual.kept])
 
     def _descend(self) -> Allocation | None:
-        """Descend before prices change, as their steps depend on the cost of the plan at hand."""
+        """Descend before prices are updated, as step sizes depend on the cost of the incumbent plan."""
         assert self._primal is not None
         self._descended = self._primal.descend()
         return self._better()
@@ -248,19 +248,19 @@ class PrimalDual:
         self._dual_timer.run(self._raise_bound)
 
     def _raise_bound(self, rounds: int) -> None:
-        """Work on the dual side: prices by subgradients, and when they are nearly the best, cutting planes."""
+        """Run the dual side: subgradient steps and, once prices are nearly optimal, cutting planes."""
         if self._dual is None:
             return
         if self._cuts is None and self._dual.is_nearly_optimal and self._dual.may_be_cut:
             self._cuts = self._dual.cutting_planes(self._counts, self._should_stop)
-            self._cuts.ascend(1, self._cost)  # no more, as this turn also takes the time to build them
+            self._cuts.ascend(1, self._cost)  # only one, as this turn also builds the programme
         elif self._cuts is None:
             self._dual.ascend(rounds, self._cost)
         else:
             self._cuts.ascend(min(rounds, MAX_CUT_ROUNDS), self._cost)
 
     def _better(self) -> Allocation | None:
-        """Return the best plan if it has not been returned yet; tell the primal side which pairs are likely."""
+        """Return the best plan if it is new; restrict the primal side to pairs that a better plan may use."""
         if self._primal is not None and self._cuts is not None and self._cuts.least_with is not self._least_with:
             self._least_with = self._cuts.least_with
             pairs = self._kept[self._least_with <= self._cost]
@@ -274,11 +274,11 @@ class PrimalDual:
 
     @property
     def _counts(self) -> IntArray:
-        """Agents of each pair of the dual side in the best plan."""
+        """Return the agents of each pair of the dual side in the best plan."""
         return self._model.counts(self._demand, self._plan)[self._pairs]
 
     def _begin_dual(self, task_distance: FloatArray, seconds: float) -> LagrangianBound | None:
-        """Start the dual side; None where its tables are too large."""
+        """Return the dual side; None if its tables are too large."""
         cost = self._model.cost[self._model.pairs_at(self._demand)]
         rounded, pairs = round_demand(self._demand, cost)
         cells = np.maximum(rounded.need, rounded.max_weight) if rounded.is_whole else np.full(len(rounded.need), STATES)
@@ -289,6 +289,6 @@ class PrimalDual:
 
 
 def _cost_of_plan(instance: Instance, plan: Allocation) -> float:
-    """Return what the flights of a plan cost, in units of distance."""
+    """Return the cost of the flights of a plan, in units of distance."""
     sent = np.flatnonzero(plan.task_of_agent != IDLE)
     return float(instance.reach.cost_of(sent, plan.task_of_agent[sent]).sum())

@@ -1,4 +1,4 @@
-"""The linear programme that mixes the groups of each task found so far, with cuts, by HiGHS."""
+"""The restricted master programme over the groups found so far, with cuts; solved by HiGHS."""
 
 from collections.abc import Callable
 
@@ -14,45 +14,45 @@ from alloc.allocators.runtime.interrupts import run_native
 from alloc.problems.instance import FloatArray, IntArray
 
 LEAST_VIOLATION, MOST_FOUND = 0.05, 5000
-"""Violation from which a cut over classes is added, and how many such are looked at."""
+"""Least violation of an added cut over classes, and limit on the number of violated ones considered."""
 
 MOST_CUTS, MOST_OF_CLASS = 60, 4
-"""Cuts over classes added at once, and of these how many with the same class."""
+"""Limits on cuts over classes added at once, and on those among them with the same class."""
 
 SMALL_GROUP = 12
-"""Agents for each task above which cuts over classes make the search for groups long, and so are the last resort."""
+"""Number of agents per task above which cuts over classes make the search for groups long, and are the last resort."""
 
 DUAL_SIMPLEX, PRIMAL_SIMPLEX = 1, 4
-"""How HiGHS goes on after cuts, and after groups alone: in half of the time that the former takes."""
+"""Simplex strategies of HiGHS after new cuts, and after new groups only, where the latter takes half the time."""
 
 ROOM, ROOM_FOR_CUTS = 1024, 64
-"""Groups and cuts for which there is room at first."""
+"""Initial capacities for groups and cuts."""
 
 MOST_ENTRIES = 2**25
-"""Entries of the table of groups by classes and of that by cuts, at the most: a quarter of a gigabyte each."""
+"""Limit on the entries of the tables of groups by classes and by cuts, a quarter of a gigabyte each."""
 
 
 class GroupMaster:
-    """Minimise what the mixture costs such that its use of each class and each cut is within limits.
+    """Minimise the cost of the mixture subject to the limits of each class and each cut.
 
     Parameters
     ----------
     model : EnergyModel
     member : ndarray of bool, shape (f, t)
-        Clusters of tasks, of which cuts are sought.
+        Clusters of tasks whose cuts are separated.
 
     Attributes
     ----------
     value : float
         Cost of the mixture.
     price : ndarray, shape (k,)
-        Of one agent of each class.
+        Dual price of an agent of each class.
     penalty : ndarray, shape (c,)
-        Of each cut.
+        Dual price of each cut.
     limit : ndarray, shape (c,)
-        How much all groups together can use of each cut.
+        Right-hand side of each cut.
     seeks_sets : bool
-        Whether cuts over classes are sought.
+        Whether cuts over classes are separated.
     """
 
     def __init__(self, model: EnergyModel, member: Mask) -> None:
@@ -81,9 +81,9 @@ class GroupMaster:
             self._add_row(least if least > 0 else -highspy.kHighsInf, most, np.zeros(0))
 
     def add(self, group: WholeArray) -> bool:
-        """Add the group of each task, given by pairs, shape (p,), unless it is empty; return whether any is new.
+        """Add the non-empty group of each task, given by pairs, shape (p,); return whether any is new.
 
-        None is added for which there is no room in memory; without it, bounds are lower than they could be.
+        Groups that exceed the memory limit are not added, which only weakens the bound.
         """
         is_new = False
         for j in range(self._tasks):
@@ -102,7 +102,7 @@ class GroupMaster:
         return is_new
 
     def _has_room(self, *, cut: bool = False) -> bool:
-        """Whether there is room for a group more, or a cut more; make it if memory allows."""
+        """Whether there is room for another group or cut; enlarge the tables if memory allows."""
         rows, cuts = self._used.shape
         more_groups, more_cuts = not cut and self._groups == rows, cut and len(self.limit) == cuts
         if (1 + more_groups) * rows * max(self._use.shape[1], (1 + more_cuts) * cuts) > MOST_ENTRIES:
@@ -117,7 +117,7 @@ class GroupMaster:
         return True
 
     def restrict(self, model: EnergyModel) -> None:
-        """Go on with a model that has only some of the pairs, and without the groups that have others."""
+        """Restrict the programme to a model with only some of the pairs, and to groups of these."""
         self._model, self._first = model, model.first
         stay = np.zeros((self._tasks, len(model.count)), dtype=bool)
         stay[model.task_of_pair, model.class_of_pair] = True
@@ -127,9 +127,9 @@ class GroupMaster:
         self._separation = ClusterSeparation(model, self._member)
 
     def leave_out_dear(self, price: FloatArray, penalty: FloatArray, least: FloatArray, more: float) -> None:
-        """Leave out groups that cost at some prices by `more` above the least, shape (t,), if they are not in use.
+        """Leave out unused groups whose cost at some prices exceeds the least, shape (t,), by `more`.
 
-        No better plan has them; with fewer groups the programme is solved faster. Pricing may bring them back.
+        No better plan uses them, and the programme is solved faster without them. Pricing may bring them back.
         """
         known = slice(len(self._part))
         cost = self._paid(known, price, penalty)
@@ -163,7 +163,7 @@ class GroupMaster:
         return self._task[cheap], groups, self._used[cheap, : len(self.limit)]
 
     def _paid(self, known: slice, price: FloatArray, penalty: FloatArray) -> FloatArray:
-        """Return what groups cost at prices of agents and penalties of the first cuts."""
+        """Return the costs of groups at prices of agents and penalties of the first cuts."""
         paid: FloatArray = self._cost[known] + self._use[known, :-1] @ price
         return paid + self._used[known, : len(penalty)] @ penalty
 
@@ -173,7 +173,7 @@ class GroupMaster:
             self._highs.changeColBounds(g, 0.0, 0.0)
 
     def solve(self, should_stop: Callable[[], bool]) -> bool:
-        """Solve; return whether that succeeded, as it does not where it is stopped."""
+        """Solve the programme; return whether that succeeded, which it does not if stopped."""
         only_groups = self._cuts_known == len(self.limit)  # then the last basis still has a mixture
         self._highs.setOptionValue("simplex_strategy", PRIMAL_SIMPLEX if only_groups else DUAL_SIMPLEX)
         self._cuts_known = len(self.limit)
@@ -190,14 +190,14 @@ class GroupMaster:
         return True
 
     def cheapest(self, price: FloatArray, penalty: FloatArray) -> FloatArray:
-        """Return the cost of the cheapest group known of each task at some prices, shape (t,)."""
+        """Return the cost of the cheapest known group of each task at some prices, shape (t,)."""
         known, least = slice(self._groups), np.full(self._tasks, np.inf)
         cost = self._paid(known, price, penalty)
         np.minimum.at(least, self._task[known], cost)
         return least
 
     def fees(self, penalty: FloatArray) -> FloatArray:
-        """Return what the cuts of clusters cost an agent of each pair, shape (p,)."""
+        """Return the penalties of cluster cuts for an agent of each pair, shape (p,)."""
         model, fee = self._model, np.zeros((self._tasks, len(self._model.count)))
         for at, cut in zip(self._cluster_at.tolist(), self._clusters, strict=True):
             if penalty[at] > 0:
@@ -205,7 +205,7 @@ class GroupMaster:
         return fee[model.task_of_pair, model.class_of_pair]
 
     def cuts_of_pairs(self, penalty: FloatArray) -> tuple[WholeArray, WholeArray]:
-        """Return where the cuts over classes begin of each pair, shape (p + 1,), and these, if they have a penalty."""
+        """Return the cuts over classes with a penalty of each pair, as start indices, shape (p + 1,), and a list."""
         on = np.flatnonzero(penalty[self._set_at])
         entry = (np.ones(3 * len(on)), (self._sets[on].ravel(), np.repeat(self._set_at[on], 3)))
         table = csr_array(entry, shape=(len(self._count), max(1, len(penalty))))[self._model.class_of_pair]
@@ -213,11 +213,11 @@ class GroupMaster:
 
     @property
     def sets(self) -> IntArray:
-        """Which cuts are over classes."""
+        """Indices of the cuts over classes."""
         return self._set_at
 
     def used(self, task: IntArray, use: FloatArray) -> FloatArray:
-        """Return what groups use of each cut, given their tasks and agents of each class, shapes (g, c) and (g, k)."""
+        """Return the coefficients of groups in each cut, shape (g, c), given their tasks and agents of each class."""
         used, padded = np.zeros((len(task), len(self.limit))), np.hstack([use, np.zeros((len(task), 1))])
         used[:, self._set_at] = sum(padded[:, members] for members in self._sets.T) // 2
         for at, cut in zip(self._cluster_at.tolist(), self._clusters, strict=True):
@@ -225,7 +225,7 @@ class GroupMaster:
         return used
 
     def separate(self, should_stop: Callable[[], bool]) -> bool:
-        """Add the cuts that the mixture violates most; return whether there are any, as far as time and memory go."""
+        """Add the cuts that the mixture violates most, within time and memory; return whether there are any."""
         before = len(self.limit)
         on = np.flatnonzero(self._part > 1e-6)
         for cut in self._separation.violated(self._use[on, :-1], self._task[on], self._part[on], should_stop):
@@ -239,7 +239,7 @@ class GroupMaster:
         return len(self.limit) > before
 
     def leave_out_sets(self) -> IntArray:
-        """Take out the cuts over classes, seek no more of them, and return which they were."""
+        """Remove the cuts over classes, separate no more of them, and return their indices."""
         self.seeks_sets, first, sets = False, self._tasks + len(self._model.count), self._set_at
         for row in (first + self._set_at).tolist():
             self._highs.changeRowBounds(row, -highspy.kHighsInf, highspy.kHighsInf)
