@@ -1,4 +1,4 @@
-"""Lower bounds: never above the optimum, and as tight as they can be by hand."""
+"""Lower bounds: never above the optimum, and equal to hand-computed values."""
 
 from typing import Any
 from unittest import mock
@@ -18,7 +18,7 @@ ROUNDING = 1 + 1e-9
 
 @given(instances(most_agents=5, most_tasks=3))
 def test_never_above_the_optimum(instance: Instance) -> None:
-    """Where all tasks can be served, no bound exceeds what brute force reaches."""
+    """If all tasks can be served, no bound exceeds the optimum of brute force."""
     best = brute_force(instance)
     assume(not best.unserved)
     assert makespan_lower_bound(instance) <= best.makespan * ROUNDING
@@ -59,7 +59,7 @@ def test_one_more_agent_never_raises_it(instance: Instance) -> None:
     ],
 )
 def test_by_hand(fields: dict, bound: float) -> None:
-    """Each of the ideas behind the bound is the one that counts somewhere."""
+    """Each part of the bound is the largest in some instance."""
     assert makespan_lower_bound(Instance(**fields)) == pytest.approx(bound)
 
 
@@ -101,7 +101,7 @@ def test_paper_instances_need_an_hour(scenario: int) -> None:
 
 
 def test_a_starved_task_is_bounded_tightly() -> None:
-    """One agent alone with a thousand times the work of all others: no tolerance of the solver blurs the bound."""
+    """If one agent has a thousand times the work of all others, tolerances of the solver do not weaken the bound."""
     lists = [[0], *[list(range(1, 31))] * 300]
     instance = Instance(ability=np.ones(301), workload=[1e4, *[1] * 30], allowed_tasks=lists)
     assert lp_makespan_lower_bound(instance) == pytest.approx(1e4, rel=1e-11)
@@ -109,7 +109,7 @@ def test_a_starved_task_is_bounded_tightly() -> None:
 
 @given(instances(most_agents=4, most_tasks=3), st.integers(0, 2**32))
 def test_any_multipliers_give_a_bound(instance: Instance, seed: int) -> None:
-    """However wrong the solver's answer is, what is made of it holds."""
+    """Bounds are valid even for wrong multipliers of the solver."""
     best, rng = brute_force(instance), np.random.default_rng(seed)
     assume(not best.unserved)
 
@@ -123,7 +123,7 @@ def test_any_multipliers_give_a_bound(instance: Instance, seed: int) -> None:
 
 
 def test_shares_of_all_magnitudes() -> None:
-    """Where an agent does a task more often than any counter can tell, the bounds hold all the same."""
+    """Bounds are valid for extreme ratios of ability to workload."""
     instance = Instance(ability=[1e-60, 1.0], workload=[1.0, 1e-60])
     assert (lp_makespan_lower_bound(instance) or 0.0) <= 1.0 + 1e-9
     assert makespan_lower_bound(instance) <= 1.0
@@ -131,6 +131,6 @@ def test_shares_of_all_magnitudes() -> None:
 
 @pytest.mark.parametrize("work", [1e-60, 3e-60, 1e-59])
 def test_steps_that_no_longer_move_end(work: float) -> None:
-    """The smallest workloads that there are have a bound too: none that some plan undercuts."""
+    """The smallest representable workloads have a valid bound, too."""
     instance = Instance(ability=[1, 2, 3, 4], workload=[work, work * 3, 0])
     assert makespan_lower_bound(instance) <= brute_force(instance).makespan

@@ -1,10 +1,10 @@
-"""Errors that help to mend what is wrong."""
+"""Helpful error messages."""
 
 from alloc.problems.errors import nearest
 
 
 def test_nearest_name_is_offered() -> None:
-    """One that is near is enough; where none is, those that are known are listed."""
+    """The most similar name is offered, or the known ones if none is similar."""
     assert nearest("spede", ["speed", "range"]) == " (did you mean 'speed'?)"
     assert nearest("xyz", ["speed", "range"]) == " (known: speed, range)"
     assert nearest("xyz", []) == ""
@@ -14,7 +14,7 @@ def test_nearest_name_is_offered() -> None:
 
 
 def test_long_lists_are_cut() -> None:
-    """Of thousands of names a line holds ten, and says how many there are besides."""
+    """Of thousands of names, ten are listed, with the number of the others."""
     ids = [f"agent-{number}" for number in range(5000)]
     assert nearest("xyz", ids) == f" (known: {', '.join(ids[:10])} and 4990 more)"
     assert nearest("agnt-7", ids) == " (did you mean 'agent-7'?)"

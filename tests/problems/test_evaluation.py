@@ -1,4 +1,4 @@
-"""The evaluator: values worked by hand, and laws."""
+"""The evaluator: hand-computed values, and invariants."""
 
 import sys
 
@@ -66,7 +66,7 @@ def test_violations_by_hand(line: Instance) -> None:
     ],
 )
 def test_reasons_of_violations(limits: dict, reason: str) -> None:
-    """Each rule that can be broken is named."""
+    """Each violated rule has its reason."""
     instance = Instance(ability=[1], workload=[1, 1], agent_position=[[0, 0]], task_position=[[2, 0], [0, 0]], **limits)
     assert reason in evaluate(instance, Allocation([0])).violations[0].reason
     assert not evaluate(instance, Allocation([1])).violations
@@ -101,7 +101,7 @@ def test_no_work_at_all() -> None:
 
 
 def test_reward_saturates() -> None:
-    """A deficit of 5000 is beyond floats: the reward is the most negative finite float, and says so."""
+    """A shortfall of 5000 overflows: the reward is the most negative float and marked as saturated."""
     score = evaluate(Instance(ability=[1], workload=[5000], tau=0.5), Allocation([0]))
     assert (score.reward, score.reward_saturated) == (-sys.float_info.max, True)
     sum_only = evaluate(Instance(ability=[1], workload=[1024.9, 1024.9, 1024.9]), Allocation([-1]))
@@ -115,7 +115,7 @@ def test_a_large_surplus_gives_no_reward_but_no_warning() -> None:
 
 
 def test_served_tasks_are_never_called_unserved() -> None:
-    """The longest hours that numbers within their limits give, by little ability or little speed, are finite."""
+    """Completion times of served tasks are finite for all valid abilities and speeds."""
     slow = Instance(ability=[1e-60], workload=[1e60])
     assert evaluate(slow, Allocation([0])).makespan == pytest.approx(1e120)
     far = Instance(ability=[1], workload=[1], agent_position=[[0, 0]], task_position=[[1e60, 0]], speed=[1e-60])
@@ -124,13 +124,13 @@ def test_served_tasks_are_never_called_unserved() -> None:
 
 @pytest.mark.parametrize("tasks", [[0], [0, 0, 0], [0, 3], [-2, 0]])
 def test_wrong_shapes_and_indices(tasks: list[int]) -> None:
-    """Another number of agents, or a task that does not exist, is an error."""
+    """A wrong number of agents, or an invalid task, is an error."""
     with pytest.raises(InputError):
         evaluate(Instance(ability=[1, 1], workload=[1, 1, 1]), Allocation(tasks))
 
 
 def test_order_of_better() -> None:
-    """Fewer unserved tasks beat makespan, makespan beats energy, and 1e-9 is no difference."""
+    """Unserved tasks take precedence over makespan, and makespan over energy; differences of 1e-9 are ties."""
     instance = Instance(
         ability=[2, 2, 1],
         workload=[4, 2],
@@ -198,7 +198,7 @@ def test_scores_are_read_only(line: Instance) -> None:
     ],
 )
 def test_scores_and_bounds_stay_finite(fields: dict) -> None:
-    """However far apart and dear, distances and energies are floats that a file can hold, without a warning."""
+    """Extreme distances and energies give finite values without warnings."""
     instance = Instance(ability=[1, 2], workload=[1, 2], **fields)
     score = evaluate(instance, Allocation([0, 1]))
     assert score.makespan is not None

@@ -1,4 +1,4 @@
-"""An instance is checked once, and read-only from then on."""
+"""Instances are validated on construction, and read-only."""
 
 import numpy as np
 import pytest
@@ -56,7 +56,7 @@ def test_defaults() -> None:
     ],
 )
 def test_errors_name_the_place(fields: dict, place: str) -> None:
-    """Whatever breaks a rule is refused with the place in the data."""
+    """Invalid values are refused with their place in the data."""
     with pytest.raises(InputError) as caught:
         Instance(**{"ability": [1, 1], "workload": [1, 1], **fields})
     assert caught.value.place == place
@@ -72,21 +72,21 @@ def test_errors_name_the_place(fields: dict, place: str) -> None:
     ],
 )
 def test_bases_that_are_none_are_refused(fields: dict, message: str) -> None:
-    """A base that there is not, one beside `returns` that says no, and names and places that files cannot keep."""
+    """Unknown bases, contradictions with `returns`, and names and places that files cannot store are refused."""
     with pytest.raises(InputError, match=message):
         Instance(**{"ability": [1], "workload": [1], "bases": {"north": (0, 1)}, **fields})
 
 
 @pytest.mark.parametrize("kind", ["agent_ids", "task_ids"])
 def test_ids_are_unique(kind: str) -> None:
-    """Two of the same name are an error, and so is another number of names."""
+    """Repeated names, and a wrong number of names, are errors."""
     for ids in (["x", "x"], ["x"]):
         with pytest.raises(InputError):
             Instance(ability=[1, 1], workload=[1, 1], **{kind: ids})
 
 
 def test_start_position() -> None:
-    """A position counts before a start task, a start task before nothing; 2-D positions lie at z = 0."""
+    """A position takes precedence over a start task; 2-D positions have z = 0."""
     instance = Instance(
         ability=[1, 1, 1],
         workload=[1, 1],
@@ -99,7 +99,7 @@ def test_start_position() -> None:
 
 
 def test_allowed_tasks() -> None:
-    """Lists are sorted, without repetitions; none at all is something else than an empty one."""
+    """Lists are sorted and unique; None differs from an empty list."""
     lists = [(2, 0, 2), None, [], np.array([1]), {1, 0}]
     instance = Instance(ability=np.ones(5), workload=[1, 1, 1], allowed_tasks=lists)
     assert instance.allowed_tasks is not None
@@ -120,7 +120,7 @@ def test_allowed_tasks() -> None:
 
 
 def test_without_agents() -> None:
-    """Those who are left keep all that they have, and the tasks stay as they are."""
+    """The remaining agents keep all fields, and tasks are unchanged."""
     instance = Instance(
         ability=[1, 2, 3],
         workload=[4, 5],
@@ -143,7 +143,7 @@ def test_without_agents() -> None:
 
 
 def test_read_only_and_independent() -> None:
-    """Arrays that were given can change afterwards, those of the instance cannot."""
+    """Given arrays can be changed afterwards without effect; arrays of the instance are read-only."""
     given = np.array([1.0, 2.0])
     instance = Instance(ability=given, workload=[1])
     given[0] = 9

@@ -1,4 +1,4 @@
-"""What `alloc.problems` gives, and what that loads."""
+"""Public names of `alloc.problems`, and the modules that they load."""
 
 import subprocess
 import sys
@@ -9,7 +9,7 @@ import alloc.problems
 
 
 def test_every_public_name_resolves() -> None:
-    """Each name in `__all__` is there, is listed by `dir`, and has a docstring or is a number."""
+    """Each name in `__all__` exists, is listed by `dir`, and has a docstring or is a number."""
     for name in alloc.problems.__all__:
         value = getattr(alloc.problems, name)
         assert name in dir(alloc.problems)
@@ -17,7 +17,7 @@ def test_every_public_name_resolves() -> None:
 
 
 def test_unknown_names_are_attribute_errors() -> None:
-    """A misspelt name is told as any module tells it."""
+    """An unknown name is the usual attribute error."""
     with pytest.raises(AttributeError, match=r"module 'alloc\.problems' has no attribute 'Instanse'"):
         alloc.problems.Instanse  # noqa: B018 - the access is what is tested
 

@@ -21,7 +21,7 @@ def test_names_are_cut_where_they_stay_different(names: list[str], short: list[s
 
 
 def test_names_that_differ_nowhere_else_are_numbered() -> None:
-    """Where neither end tells names apart, they get numbers, and stay as short as the others."""
+    """Names that differ at neither end get numbers, within the length limit."""
     names = [f"{'x' * 30}{letter}{'x' * 30}" for letter in "abc"]
     short = short_names(names, 10)
     assert len(set(short)) == 3
@@ -39,5 +39,5 @@ def test_units_are_left_out_where_there_are_none() -> None:
     [(1714.2, "1714"), (-12345.6, "-12346"), (0.0012345, "0.00123"), (12.345, "12.3"), (2.5e7, "2.5e+07"), (None, "-")],
 )
 def test_numbers_are_read_without_an_exponent(value: float | None, text: str) -> None:
-    """Three digits of an ability of 1714 are not 1.71e+03; what is larger than ten millions has an exponent."""
+    """Numbers up to ten million have no exponent; larger ones do."""
     assert number(value, 3) == text

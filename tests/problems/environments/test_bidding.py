@@ -19,7 +19,7 @@ def small(**options) -> BiddingEnv:
 
 
 def made() -> BiddingEnv:
-    """Ranges, batteries, places of their own, drawn anew at each reset."""
+    """An environment with random ranges, batteries and places, new at each reset."""
     family = Family(agents=6, tasks=4, starts="own", communication_range=(0.2, 0.8), battery=(0.5, 3.0))
     return BiddingEnv(lambda rng: random_instance(family, int(rng.integers(2**31))))
 
@@ -45,7 +45,7 @@ def test_it_passes_the_test_of_stable_baselines3(make) -> None:
 
 @pytest.mark.parametrize("name", EXTREMES)
 def test_observations_lie_in_their_space(name: str) -> None:
-    """Whatever the numbers, what is seen is within the bounds, and rewards are finite."""
+    """Observations are within their bounds and rewards finite, also for extreme numbers."""
     for reward in Reward:
         env = BiddingEnv([EXTREMES[name]], rules=Rules(reward=reward, flying=True))
         seen, _ = env.reset(seed=0)
@@ -77,7 +77,7 @@ def test_a_game_by_hand(street: Instance) -> None:
 
 
 def test_illegal_actions_change_nothing(street: Instance) -> None:
-    """Staying is no bid: it costs a step, and what was asked for."""
+    """Staying is not a bid: it uses up a step and gives the illegal reward."""
     env = BiddingEnv([street], illegal_reward=-0.1, max_steps=2)
     before, _ = env.reset(seed=0)
     seen, reward, ended, cut, info = env.step(np.int64(0))
@@ -88,7 +88,7 @@ def test_illegal_actions_change_nothing(street: Instance) -> None:
 
 @pytest.mark.parametrize("rules", [Rules(), Rules(reward="coverage"), Rules(flying=True, returning=True)])
 def test_rewards_add_up_to_the_rise_of_the_utility(rules: Rules) -> None:
-    """Whatever is played, an episode brings what it changed."""
+    """Rewards of any episode sum to the increase of the utility."""
     env = BiddingEnv([paper_like(8, 3, 30, 1)], rules=rules)
     env.reset(seed=0)
     env.action_space.seed(0)
@@ -101,7 +101,7 @@ def test_rewards_add_up_to_the_rise_of_the_utility(rules: Rules) -> None:
 
 
 def test_the_same_seed_plays_the_same_games() -> None:
-    """Instances follow each other by the seed alone; other seeds bring other instances."""
+    """The seed determines the sequence of instances; other seeds give other ones."""
 
     def games(seed: int) -> list[float]:
         env = made()
@@ -112,6 +112,6 @@ def test_the_same_seed_plays_the_same_games() -> None:
 
 
 def test_wrong_use_is_refused() -> None:
-    """Rules by which agents choose at once are an error that names the other environment."""
+    """Simultaneous rules are an error that names the other environment."""
     with pytest.raises(InputError, match="SimultaneousEnv"):
         small(rules=PAPER)

@@ -1,11 +1,11 @@
-"""What the environments need."""
+"""Packages that the environments need."""
 
 import subprocess
 import sys
 
 
 def test_what_is_missing_is_named() -> None:
-    """Without the extra the message says what to install."""
+    """Without the extra, the message says what to install."""
     code = (
         "import sys\nsys.modules['gymnasium'] = None\n"
         "try:\n    import alloc.problems.environments\nexcept ModuleNotFoundError as error:\n    print(error)"

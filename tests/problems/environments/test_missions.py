@@ -1,4 +1,4 @@
-"""Missions as environments of PettingZoo and Gymnasium."""
+"""Missions as PettingZoo and Gymnasium environments."""
 
 import re
 import warnings
@@ -41,7 +41,7 @@ def fleet(**options) -> MissionFleetEnv:
 
 @pytest.fixture
 def street() -> Mission:
-    """Agents at 0 and 9, speed 1, who see 2 far and hear nothing; tasks at 1, 5 and 8, the last from hour 1 on."""
+    """Agents at 0 and 9, speed 1, sensing radius 2, no radio; tasks at 1, 5 and 8, the last from hour 1 on."""
     instance = Instance(
         ability=[1, 2],
         workload=[2, 4, 6],
@@ -98,7 +98,7 @@ def test_state_and_text_pass_pettingzoos_own_tests(capsys) -> None:
 
 
 def test_the_state_is_what_is_so(street: Mission) -> None:
-    """It has what no agent sees, and nothing of the task that is to come; the text says the same."""
+    """The state includes what no agent sees, but not the future task; the text agrees."""
     for env in (MissionEnv([street], grid=0, render_mode="ansi"), MissionFleetEnv([street], render_mode="ansi")):
         env.reset(seed=0)
         state = env.state()
@@ -128,7 +128,7 @@ def play(env: MissionEnv, choose) -> dict[str, float]:
 
 
 def test_observations_lie_in_their_space_and_rewards_add_up() -> None:
-    """Whatever is played, what is seen is within bounds; an agent's rewards are those of all from its first turn on."""
+    """Observations are within bounds; an agent's rewards are the common ones from its first turn on."""
     env = agents(energy_weight=0.1)
     rng = np.random.default_rng(0)
     for seed in range(5):
@@ -144,7 +144,7 @@ def test_observations_lie_in_their_space_and_rewards_add_up() -> None:
 
 
 def test_an_agent_knows_what_it_sees(street: Mission) -> None:
-    """It sees the task at distance 1, not those at 5 and 8, nor the other agent; what it may choose follows."""
+    """It sees the task at distance 1, not those at 5 and 8, nor the other agent; its action mask agrees."""
     env = MissionEnv([street], grid=0)
     env.reset(seed=0)
     assert env.agent_selection == "agent_0"
@@ -190,7 +190,7 @@ def test_a_mission_by_hand(street: Mission) -> None:
 
 
 def test_no_information_leaks(street: Mission) -> None:
-    """What an agent sees does not change with what lies beyond its sight and was not told."""
+    """Observations do not depend on anything outside the sensing radius that was not reported."""
     seen = []
     for work in (4, 400):
         changed = Mission(
@@ -215,7 +215,7 @@ def test_no_information_leaks(street: Mission) -> None:
 
 
 def test_the_fleet_leads_as_a_policy_does() -> None:
-    """Sending each free agent to the nearest task it can take comes to the figures of `nearest` with full knowledge."""
+    """Sending each free agent to the nearest feasible task gives the result of `nearest` with full knowledge."""
     mission = random_mission(SMALL, 5)
     env = MissionFleetEnv([mission])
     env.reset(seed=0)
@@ -231,7 +231,7 @@ def test_the_fleet_leads_as_a_policy_does() -> None:
 
 
 def test_illegal_actions_leave_agents_as_they_are(street: Mission) -> None:
-    """What the mask bars is no order; the fleet pays for it, and infos say so."""
+    """Masked actions change nothing; the fleet gets the illegal reward, and infos say so."""
     env = MissionFleetEnv([street], illegal_reward=-1.0)
     env.reset(seed=0)
     _, reward, *_, info = env.step(np.int64(1))  # at 5, beyond the first agent's battery

@@ -20,7 +20,7 @@ def small(**options) -> SimultaneousEnv:
 
 
 def made() -> SimultaneousEnv:
-    """Ranges, batteries, places of their own, drawn anew at each reset."""
+    """An environment with random ranges, batteries and places, new at each reset."""
     family = Family(agents=6, tasks=4, starts="own", communication_range=(0.2, 0.8), battery=(0.5, 3.0))
     return SimultaneousEnv(lambda rng: random_instance(family, int(rng.integers(2**31))), max_steps=8)
 
@@ -52,7 +52,7 @@ def test_it_passes_pettingzoos_own_tests(make) -> None:
 
 @pytest.mark.parametrize("name", EXTREMES)
 def test_observations_lie_in_their_space(name: str) -> None:
-    """Whatever the numbers, what agents see is within the bounds, and rewards are finite."""
+    """Observations are within their bounds and rewards finite, also for extreme numbers."""
     for reward in Reward:
         rules = Rules(TurnRule.SIMULTANEOUS, reward, flying=True, returning=True)
         env = SimultaneousEnv([EXTREMES[name]], rules=rules, max_steps=4)
@@ -66,7 +66,7 @@ def test_observations_lie_in_their_space(name: str) -> None:
 
 
 def test_what_an_agent_sees_by_hand(street: Instance) -> None:
-    """In its range of 5 the first agent sees the tasks at 0 and 3, and not who is at 7, 7 away."""
+    """Within its range of 5 the first agent sees the tasks at 0 and 3, but not the agents at 7."""
     env = SimultaneousEnv([street])
     seen, _ = env.reset(seed=0)
     table = dict(zip(SEEN, seen["agent_0"]["tasks"].T.tolist(), strict=True))
@@ -86,7 +86,7 @@ def test_what_an_agent_sees_by_hand(street: Instance) -> None:
 
 
 def test_what_is_out_of_range_is_not_seen(street: Instance) -> None:
-    """Whether the third agent, 7 away, works or not changes nothing that the first one sees, and the reverse."""
+    """What the third agent does, at distance 7, does not affect the first one's observation, and vice versa."""
     views = []
     for last in (2, 3):
         env = SimultaneousEnv([street])
@@ -128,7 +128,7 @@ def test_rewards_are_those_of_the_game(street: Instance) -> None:
 
 
 def test_the_end(street: Instance) -> None:
-    """Nobody moving ends the game; too many steps cut it off; at both ends the plan is scored as everywhere."""
+    """A step without moves ends the game, too many steps truncate it; in both cases the plan is scored as usual."""
     env = SimultaneousEnv([street], max_steps=2)
     env.reset(seed=0)
     env.step(everybody(env, 1, 0, 2))
@@ -150,7 +150,7 @@ def test_the_end(street: Instance) -> None:
 
 
 def test_the_same_seed_plays_the_same_games() -> None:
-    """Instances follow each other by the seed alone; other seeds bring other instances."""
+    """The seed determines the sequence of instances; other seeds give other ones."""
 
     def games(seed: int) -> list[float]:
         env = made()
@@ -162,7 +162,7 @@ def test_the_same_seed_plays_the_same_games() -> None:
 
 
 def test_wrong_use_is_refused() -> None:
-    """Rules by which agents bid, no instances, and instances that differ in size are errors that say so."""
+    """Bidding rules, missing instances, and instances of different sizes are errors."""
     with pytest.raises(InputError, match="BiddingEnv"):
         small(rules=PLANNING)
     with pytest.raises(InputError, match="none"):

@@ -1,4 +1,4 @@
-"""Instances of every kind, and what it means that two are the same."""
+"""Instances of every kind, and exact comparisons of instances."""
 
 import os
 import tempfile
@@ -72,7 +72,7 @@ def the_error(path: Any, read: Callable[[Any], object] = read_instance) -> Input
 
 @pytest.fixture
 def bound(tmp_path: Path) -> Iterator[Path]:
-    """A folder of a user whom permissions bind: root is nobody until the test ends."""
+    """A folder in which permissions apply: root acts as an unprivileged user during the test."""
     if os.geteuid() != 0:
         yield tmp_path
         return
@@ -213,7 +213,7 @@ def optional_fields(draw: st.DrawFn, agents: list[str], tasks: list[str]) -> dic
 
 @st.composite
 def instances(draw: st.DrawFn) -> Instance:
-    """Any instance whatever, small."""
+    """Draw any small instance."""
     n, m = draw(st.integers(1, 4)), draw(st.integers(1, 4))
     limit = st.one_of(st.just(np.inf), st.floats(0, 1e100))
 

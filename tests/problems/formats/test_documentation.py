@@ -1,4 +1,4 @@
-"""What docs/data/formats.md shows is what the readers take."""
+"""The examples and tables of docs/data/formats.md agree with the readers."""
 
 import re
 import textwrap
@@ -80,7 +80,7 @@ def test_the_examples_of_distances_are_read(tmp_path: Path) -> None:
 
 
 def test_the_example_of_bases_is_read(tmp_path: Path) -> None:
-    """The flights of the example are as long as the text says."""
+    """The flights of the example have the lengths given in the text."""
     (tmp_path / "x.json").write_text(example("Instance: JSON", BASES))
     reach = read_instance(tmp_path / "x.json").reach
     assert reach.cost[reach.origin].ravel().tolist() == [4 + 5, 3 + 3]

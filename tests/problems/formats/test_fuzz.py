@@ -1,4 +1,4 @@
-"""Damaged files are read, or refused with one line; nothing else ever happens."""
+"""Damaged files are either read, or refused in one line."""
 
 import tempfile
 from pathlib import Path
@@ -60,7 +60,7 @@ def test_damaged_files(
 @settings(max_examples=100, deadline=None)
 @given(cut=st.floats(0, 1, exclude_max=True), file=st.sampled_from(["x.json", "x.npz"]))
 def test_cut_off_files_are_refused(cut: float, file: str) -> None:
-    """No beginning of a valid file is read as if it were whole."""
+    """No prefix of a valid file is read as if it were complete."""
     instance = Instance(ability=[1, 2], workload=[3, 4], battery=[5, 6])
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / file

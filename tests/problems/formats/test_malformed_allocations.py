@@ -1,4 +1,4 @@
-"""Each fault in an allocation is one line with file, place and mend."""
+"""Each error in an allocation is one line with file, place and correction."""
 
 import json
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Each fault in a folder of tables is one line with folder, file, line and column, and mend."""
+"""Each error in a folder of tables is one line with folder, file, line, column and correction."""
 
 import json
 import os
@@ -140,7 +140,7 @@ def test_tables_that_break_a_rule(tmp_path: Path, files: dict[str, str | bytes],
 
 @pytest.mark.parametrize("name", ["agents.csv", "tasks.csv", "distances.csv", "instance.json"])
 def test_folders_with_odd_entries(tmp_path: Path, name: str) -> None:
-    """A table that is a folder, a pipe or a dangling link is told by name."""
+    """A table that is a folder, a pipe or a dangling link is named in the error."""
     path = table_folder(tmp_path / "fleet", {name: ""}) / name
     path.unlink()
     if name in ("agents.csv", "tasks.csv"):

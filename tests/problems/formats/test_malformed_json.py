@@ -1,4 +1,4 @@
-"""Each fault in a JSON instance is one line with source, place and mend."""
+"""Each error in a JSON instance is one line with source, place and correction."""
 
 import io
 import json
@@ -225,7 +225,7 @@ DOCUMENTS = [
 
 @pytest.mark.parametrize(("document", "place", "words"), DOCUMENTS)
 def test_documents_that_break_a_rule(tmp_path: Path, document: dict[str, Any], place: str, words: str) -> None:
-    """Each rule of the format is checked, and its breach told with the place, as a file and as plain objects."""
+    """Each rule of the format is checked, with the place of violations, for files and plain objects."""
     with pytest.raises(InputError):
         from_document(document)
     (tmp_path / "x.json").write_text(json.dumps(document))
@@ -235,7 +235,7 @@ def test_documents_that_break_a_rule(tmp_path: Path, document: dict[str, Any], p
 
 
 def test_magnitudes_that_overflow(tmp_path: Path) -> None:
-    """Abilities that are finite, but beyond what is worked with, are refused with the limits."""
+    """Finite abilities beyond the limits are refused with the limits."""
     document = changed(agents=[{"id": name, "ability": 1.7e308} for name in "ab"])
     (tmp_path / "x.json").write_text(json.dumps(document))
     assert "must be from 1e-60 to 1e+60" in the_error(tmp_path / "x.json").message

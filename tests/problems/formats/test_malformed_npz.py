@@ -1,4 +1,4 @@
-"""Each fault in a columnar file is one line with file, array, row and mend."""
+"""Each error in a columnar file is one line with file, array, row and correction."""
 
 import io
 import struct
@@ -109,7 +109,7 @@ def npy(header: str, data: bytes = b"") -> bytes:
 
 
 def bomb() -> bytes:
-    """A small archive whose directory promises 5 GiB."""
+    """A small archive whose directory declares 5 GiB."""
     data = bytearray(archive(agent_id__npy=b"x" * 1000))
     directory = data.index(b"PK\x01\x02")
     data[directory + 24 : directory + 28] = struct.pack("<I", 0xFFFFFFF0)
@@ -150,14 +150,14 @@ BYTES = {
 
 @pytest.mark.parametrize("case", BYTES)
 def test_archives_that_are_none(tmp_path: Path, case: str) -> None:
-    """Bytes that are no columnar file, in whatever way, are told as such, and nothing is unpickled."""
+    """Bytes that are not a columnar file are refused as such, and nothing is unpickled."""
     data, words = BYTES[case]
     (tmp_path / "x.npz").write_bytes(data)
     assert words in the_error(tmp_path / "x.npz").message
 
 
 def test_a_zip_bomb_is_not_unpacked(tmp_path: Path) -> None:
-    """An archive that unpacks to more than 4 GiB is refused by its directory alone."""
+    """An archive of more than 4 GiB uncompressed is refused by its directory, without unpacking."""
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as file:
         file.writestr("agent_id.npy", b"\0" * 1000)

@@ -1,4 +1,4 @@
-"""Paths that lead to no readable file are told on one line."""
+"""Paths without a readable file are one-line errors."""
 
 import os
 import stat
@@ -41,7 +41,7 @@ PATHS = [
 
 @pytest.mark.parametrize(("path", "words"), PATHS)
 def test_paths_that_are_no_instance(tmp_path: Path, path: str, words: str) -> None:
-    """Files of the wrong kind, or none at all, are told as such, without waiting on a pipe."""
+    """Files of the wrong kind, or missing ones, are reported as such, without waiting on a pipe."""
     for name in ("folder.json", "folder.npz", "folder"):
         (tmp_path / name).mkdir()
     for name in ("pipe.json", "pipe.npz", "pipe"):
@@ -60,7 +60,7 @@ def test_paths_that_are_no_instance(tmp_path: Path, path: str, words: str) -> No
 
 
 def test_devices_are_no_instances() -> None:
-    """The null device ends neither in waiting nor in a traceback."""
+    """The null device causes neither waiting nor a traceback."""
     assert "has no known format" in the_error("/dev/null").message
     instance = Instance(ability=[1], workload=[1])
     assert "is a pipe or device" in the_error("/dev/null", lambda path: read_allocation(path, instance)).message
@@ -68,7 +68,7 @@ def test_devices_are_no_instances() -> None:
 
 @pytest.mark.parametrize("file", ["x.json", "x.npz", "x"])
 def test_unreadable_files(bound: Path, file: str, full: Instance) -> None:
-    """Missing permissions are told, and what to do about them."""
+    """Missing permissions are reported with a correction."""
     path = bound / file
     write_instance(full, path)
     locked = path / "agents.csv" if path.is_dir() else path
@@ -80,7 +80,7 @@ def test_unreadable_files(bound: Path, file: str, full: Instance) -> None:
 
 
 def test_unreadable_files_as_the_system_tells(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Whatever the system says against reading becomes one line; so does what does not fit into memory."""
+    """Errors of the system on reading become one line, and so does lack of memory."""
     (tmp_path / "x.json").write_text("{}")
     for fault, words in (
         (PermissionError(13, "Permission denied"), "cannot be read: permission denied; change its permissions"),
@@ -96,6 +96,6 @@ def test_unreadable_files_as_the_system_tells(tmp_path: Path, monkeypatch: pytes
 
 
 def test_closed_standard_input(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Without standard input there is nothing to read, and that is told."""
+    """A closed standard input is reported."""
     monkeypatch.setattr(sys, "stdin", None)
     assert the_error("-").message == "is closed"

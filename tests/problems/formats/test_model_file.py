@@ -1,4 +1,4 @@
-"""Exported models: what solvers make of them is the optimum."""
+"""Exported models: their solutions by solvers are optimal."""
 
 import subprocess
 from pathlib import Path
@@ -57,7 +57,7 @@ def test_optimum_of_the_model_is_that_of_brute_force(tmp_path: Path, seed: int, 
 @pytest.mark.needs("cbcbox")
 @pytest.mark.parametrize("file_format", ["lp", "mps"])
 def test_cbc_reads_what_is_written(tmp_path: Path, file_format: str) -> None:
-    """Another solver takes variables as whole numbers too, and its solution is read."""
+    """Another solver also treats variables as integers, and its solution is read."""
     import cbcbox
 
     (cbc,) = Path(cbcbox.__path__[0]).glob("cbc_dist/bin/cbc")
@@ -72,7 +72,7 @@ def test_cbc_reads_what_is_written(tmp_path: Path, file_format: str) -> None:
 
 
 def test_names_and_comments_tell_agents_and_tasks(tmp_path: Path) -> None:
-    """Variables are named after ids, a class after its first agent; comments list classes and ids that are no names."""
+    """Variables are named after ids, a class after its first agent; comments list classes and renamed ids."""
     instance = Instance(
         ability=[4, 4, 2], workload=[7, 3], agent_ids=["drone 1", "d2", "ü"], task_ids=["north field", "t"]
     )

@@ -1,4 +1,4 @@
-"""What readers accept: defaults, short forms, other encodings of the same."""
+"""Input accepted by readers: defaults, short forms, equivalent encodings."""
 
 import io
 import json
@@ -58,7 +58,7 @@ def test_defaults(tmp_path: Path, file: str) -> None:
 
 
 def test_null_means_the_default(tmp_path: Path) -> None:
-    """Null is the same as leaving an optional field out, for every one of them."""
+    """Null is equivalent to leaving an optional field out."""
     document = json.loads(DESIGN)
     document |= {"name": None, "tau": None, "energy_per_distance": None}
     document["agents"] = [{"id": "a", "ability": 1, "position": None, "start_task": None, "tasks": None}]
@@ -123,7 +123,7 @@ def test_standard_input_and_output(monkeypatch: pytest.MonkeyPatch, capsysbinary
 
 
 def test_a_result_stands_in_for_an_allocation(tmp_path: Path) -> None:
-    """The assignment of a result file is read, its other fields are not looked at, and missing agents are idle."""
+    """The assignment of a result file is read, its other fields are ignored, and missing agents are idle."""
     instance = Instance(ability=[1, 2, 3], workload=[4, 5])
     result = {"format": "alloc-result/1", "status": "feasible", "assignment": {"a1": "t2", "a2": None}, "new": 1}
     (tmp_path / "r.json").write_text(json.dumps(result))
@@ -145,7 +145,7 @@ def test_another_instance_is_a_warning(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("empty", [",", ",,,,,", " , ", '"",""', "\t,\t"])
 def test_empty_rows_of_spreadsheets_are_skipped(tmp_path: Path, empty: str) -> None:
-    """Rows that a spreadsheet has emptied are commas alone, before, between and after the others, of any number."""
+    """Empty rows, which spreadsheets write as commas, are skipped anywhere in the table."""
     (tmp_path / "agents.csv").write_text(f"{empty}\nid,ability\na,1\n{empty}\n{empty}\nb,2\n{empty}\n")
     (tmp_path / "tasks.csv").write_text(f"id,workload\n{empty}\nt,3\n{empty}")
     instance = read_instance(tmp_path)

@@ -46,7 +46,7 @@ def test_every_field_that_may_be_left_out_survives(varied: Instance, same: Same,
 
 @pytest.mark.parametrize("file", FORMATS)
 def test_fields_that_are_not_used_are_not_written(full: Instance, tmp_path: Path, file: str) -> None:
-    """An instance without the fields that came later has files without any trace of them."""
+    """Files of an instance that does not use newer fields do not contain them."""
     write_instance(full, tmp_path / file)
     if file == "x.npz":
         with np.load(tmp_path / file) as arrays:
@@ -68,7 +68,7 @@ def test_fields_that_are_not_used_are_not_written(full: Instance, tmp_path: Path
 @settings(max_examples=150, deadline=None)
 @given(instances(), st.permutations(FORMATS))
 def test_any_instance_passes_through_all_formats(instance: Instance, order: list[str]) -> None:
-    """Written and read in all three formats, one after the other in any order, nothing of an instance changes."""
+    """An instance does not change when written and read in all three formats, in any order."""
     with tempfile.TemporaryDirectory() as folder:
         current = instance
         for file in order:
@@ -132,7 +132,7 @@ def test_allocations_survive(data: st.DataObject) -> None:
 def test_distances_of_another_instance_do_not_stay(
     varied: Instance, full: Instance, same: Same, tmp_path: Path
 ) -> None:
-    """In a folder of tables, an instance without distances takes the place of one with them, and other files stay."""
+    """In a folder of tables, an instance without distances replaces one with them, and other files are kept."""
     write_instance(varied, tmp_path / "x")
     (tmp_path / "x" / "notes.txt").write_text("mine")
     write_instance(full, tmp_path / "x")
@@ -157,7 +157,7 @@ def test_geographic_tables_name_their_coordinates(varied: Instance, tmp_path: Pa
     st.permutations(FORMATS),
 )
 def test_places_on_the_earth_survive(places: list[tuple[float, float, float]], order: list[str]) -> None:
-    """Longitude, latitude and altitude come back to the bit through all formats."""
+    """Longitude, latitude and altitude are exact after writing and reading in all formats."""
     instance = Instance(ability=[1] * len(places), workload=[1], agent_position=places, metric="geographic")
     with tempfile.TemporaryDirectory() as folder:
         current = instance

@@ -1,4 +1,4 @@
-"""The schemas say what the readers take and what is written: no more, and as little less as schemas can say."""
+"""The schemas agree with readers and writers, as far as schemas can express their rules."""
 
 import copy
 import json
@@ -30,7 +30,7 @@ BEYOND += ("id of two of the", "joins two agents", "that an earlier row gives", 
 
 @pytest.mark.parametrize("name", SCHEMAS)
 def test_schemas_are_schemas(name: str) -> None:
-    """Each is valid by the draft that it names, and is of the format by whose name it is found."""
+    """Each is valid by the draft that it names, and describes the format of its name."""
     found = schema(name)
     assert found["$schema"] == Draft202012Validator.META_SCHEMA["$id"]
     Draft202012Validator.check_schema(found)
@@ -67,7 +67,7 @@ def test_documents_show_what_is_valid() -> None:
     "document", [document for document, _, words in DOCUMENTS if not any(word in words for word in BEYOND)]
 )
 def test_documents_that_break_a_rule_are_invalid(document: dict[str, Any]) -> None:
-    """What the reader refuses has a fault by the schema, but for what schemas cannot say."""
+    """Documents refused by the reader are invalid by the schema, except for rules that schemas cannot express."""
     assert list(Draft202012Validator(schema("alloc-instance/1")).iter_errors(document)) != []
 
 
@@ -101,7 +101,7 @@ def refusal(document: dict[str, Any]) -> str:
 
 
 def test_reader_and_schema_agree(varied: Instance) -> None:
-    """Any value of an instance replaced by any other is valid where the reader takes it, and else a fault or beyond."""
+    """Reader and schema agree on any changed value of an instance, except for rules that schemas cannot express."""
     document: dict[str, Any] = json.loads(json.dumps(to_document(varied)))
     document["units"]["speed"] = "kn"
     validator = Draft202012Validator(schema("alloc-instance/1"))
@@ -143,7 +143,7 @@ def test_missing_and_unknown_fields_of_instances_are_faults(varied: Instance) ->
 
 
 def test_results_and_fronts_without_a_field_are_faults(small: Instance) -> None:
-    """What is written is valid, and not if a field is left out or is of another type; more fields are allowed."""
+    """Written documents are valid, but not if a field is missing or has another type; additional fields are allowed."""
     result = solve(small, "greedy", time_limit_s=1)
     documents = [result.to_dict(), pareto(small, "local-search", points=2, iterations=10).to_dict()]
     for document in documents:
@@ -157,7 +157,7 @@ def test_results_and_fronts_without_a_field_are_faults(small: Instance) -> None:
 
 
 def test_there_is_an_error_for_other_names() -> None:
-    """A name that no format has is an error that tells the nearest one."""
+    """An unknown name is an error with the most similar name."""
     with pytest.raises(InputError, match=r"no format 'instances' \(did you mean 'alloc-instance/1'\?\)"):
         schema("instances")
 

@@ -27,7 +27,7 @@ from alloc.problems.units import speed_factor
     ],
 )
 def test_factors_are_exact(speed: str, distance: str, time: str, factor: float) -> None:
-    """What a speed is multiplied by is the float nearest to the ratio of the units."""
+    """The factor of a speed is the float nearest to the ratio of the units."""
     assert speed_factor(speed, Units(time=time, distance=distance)) == pytest.approx(factor, rel=1e-15)
 
 
@@ -52,7 +52,7 @@ def given(file: Path, **units: str) -> Path:
 
 @pytest.mark.parametrize("name", ["x.json", "x", "x.npz"])
 def test_speeds_are_converted_once(tmp_path: Path, name: str) -> None:
-    """Read in m/s they are km/h, and what is written says no more that they were something else."""
+    """Speeds in m/s are converted to km/h on reading, and written without their original unit."""
     instance = read_instance(given(tmp_path / name, speed="m/s", distance="km", time="h"))
     assert instance.speed.tolist() == [36, np.inf]
     assert instance.units == Units(distance="km", time="h")

@@ -1,4 +1,4 @@
-"""Files are written whole or not at all, and failing to write is told on one line."""
+"""Files are written atomically, and failures are one line."""
 
 import errno
 import io
@@ -20,7 +20,7 @@ def leftovers(folder: Path) -> list[str]:
 
 
 def test_an_interrupted_write_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """If the move fails or the user interrupts, the old content stays and nothing is left lying about."""
+    """If renaming fails or the user interrupts, the old content is kept and no temporary file is left."""
     path = tmp_path / "x.json"
     path.write_text("old")
     for fault in (OSError(28, "No space left on device"), KeyboardInterrupt()):
@@ -37,7 +37,7 @@ def test_an_interrupted_write_leaves_the_old_file(tmp_path: Path, monkeypatch: p
 
 
 def test_a_failing_disk_is_an_input_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A full disk is told with the file and the reason, on one line."""
+    """A full disk is reported with the file and the reason, in one line."""
 
     def full(*arguments: object) -> None:
         raise OSError(28, "No space left on device")
@@ -48,7 +48,7 @@ def test_a_failing_disk_is_an_input_error(tmp_path: Path, monkeypatch: pytest.Mo
 
 
 def test_permissions(tmp_path: Path) -> None:
-    """A new file gets what the umask leaves of 0666; a replaced one keeps its own."""
+    """A new file gets mode 0666 minus the umask; a replaced one keeps its mode."""
     before = os.umask(0o027)
     try:
         write_bytes_atomically(tmp_path / "new", b"1")
@@ -101,7 +101,7 @@ def test_devices_are_written_to_not_replaced(tmp_path: Path) -> None:
     ],
 )
 def test_where_nothing_can_be_written(tmp_path: Path, path: str, words: str) -> None:
-    """Every path that cannot be written to gives one line with the path and the reason."""
+    """Every path that is not writable gives one line with the path and the reason."""
     (tmp_path / "file").write_text("")
     (tmp_path / "folder.json").mkdir()
     with pytest.raises(InputError) as caught:
@@ -113,7 +113,7 @@ def test_where_nothing_can_be_written(tmp_path: Path, path: str, words: str) -> 
 
 
 def test_a_protected_file_is_not_replaced(bound: Path) -> None:
-    """A file without write permission stays, although its folder would allow to replace it."""
+    """A file without write permission is not replaced, although its folder would allow it."""
     path = bound / "x.json"
     path.write_text("old")
     path.chmod(0o444)
@@ -126,7 +126,7 @@ def test_a_protected_file_is_not_replaced(bound: Path) -> None:
 @pytest.mark.parametrize("field", ["name", "agent_ids", "task_ids"])
 @pytest.mark.parametrize("text", ["a\0", "\ud800"])
 def test_what_cannot_be_read_back_is_not_written(tmp_path: Path, path: str, field: str, text: str) -> None:
-    """NUL and halves of surrogate pairs in names are refused beforehand, in every format."""
+    """NUL and lone surrogates in names are refused before writing, in every format."""
     value = text if field == "name" else [text]
     instance = Instance(ability=[1], workload=[1], **{field: value})  # type: ignore[arg-type]
     with pytest.raises(InputError, match="must be valid Unicode without NUL"):
@@ -137,7 +137,7 @@ def test_what_cannot_be_read_back_is_not_written(tmp_path: Path, path: str, fiel
 
 
 def test_cells_longer_than_csv_readers_take(tmp_path: Path) -> None:
-    """A list of tasks that no CSV reader takes is refused with the way out; the other formats keep it."""
+    """A list of tasks that is too long for CSV readers is refused with an alternative; other formats keep it."""
     ids = [f"{'t' * 40}{j}" for j in range(4000)]
     instance = Instance(ability=[1], workload=[1] * 4000, task_ids=ids, allowed_tasks=[range(3999)])
     with pytest.raises(InputError, match=r"use \.json or \.npz"):
@@ -182,7 +182,7 @@ def test_a_reader_that_left_is_not_the_inputs_fault(monkeypatch: pytest.MonkeyPa
 def test_where_nothing_can_be_moved_it_is_written_in_place(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, step: str, number: int
 ) -> None:
-    """A file that is mounted by itself, or lies in a read-only folder, is overwritten, and longer content is gone."""
+    """A file that is a mount point, or in a read-only folder, is overwritten, and longer content is truncated."""
     path, real = tmp_path / "x", os.open
     path.write_text("what was there before")
     inode = path.stat().st_ino
@@ -200,7 +200,7 @@ def test_where_nothing_can_be_moved_it_is_written_in_place(
 
 
 def test_a_full_disk_leaves_what_is_overwritten_in_place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Where there is no room for all of it, the old content stays, also where nothing can be moved."""
+    """If there is not enough space, the old content is kept, also for files overwritten in place."""
 
     def fail(number: int) -> None:
         raise OSError(number, os.strerror(number))
@@ -217,7 +217,7 @@ def test_a_full_disk_leaves_what_is_overwritten_in_place(tmp_path: Path, monkeyp
 @pytest.mark.parametrize("name", ["/dev/fd/{}", "/proc/self/fd/{}", "link", "link.json"])
 @pytest.mark.parametrize("mode", ["ab", "wb"])
 def test_open_descriptors_are_written_to_where_they_stand(tmp_path: Path, name: str, mode: str) -> None:
-    """What a file has been given stays, whether it is appended to or not, and the file is the same one."""
+    """Earlier content of an open file is kept, with and without append mode, and the file is not replaced."""
     (tmp_path / "log").write_text("before\n")
     with (tmp_path / "log").open(mode) as log:
         log.write(b"earlier\n")
@@ -237,7 +237,7 @@ def test_open_descriptors_are_written_to_where_they_stand(tmp_path: Path, name: 
 
 
 def test_pipes_take_instances_without_a_suffix(tmp_path: Path) -> None:
-    """What a shell makes of ``>(command)`` and a named pipe get JSON, as standard output does."""
+    """Process substitutions of a shell and named pipes get JSON, as standard output does."""
     begin, end = os.pipe()
     write_instance(Instance(ability=[1], workload=[1]), f"/dev/fd/{end}")
     os.mkfifo(tmp_path / "pipe")
@@ -252,7 +252,7 @@ def test_pipes_take_instances_without_a_suffix(tmp_path: Path) -> None:
 
 
 def test_descriptors_that_take_nothing_are_found_before(tmp_path: Path) -> None:
-    """A descriptor that is closed, or open for reading alone, is told by the check and by the write alike."""
+    """A closed or read-only descriptor gives the same error on checking and on writing."""
     begin, end = os.pipe()
     os.close(end)
     for number in (begin, end):
@@ -264,7 +264,7 @@ def test_descriptors_that_take_nothing_are_found_before(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("path", ["absent/x.json", "folder.json", "file/x.json", "nul\0.json", "x" * 300 + ".json"])
 def test_the_check_finds_what_the_write_would(tmp_path: Path, path: str) -> None:
-    """Before a run each place is told in the same words as after it, and nothing is left there."""
+    """The check before a run gives the same errors as writing, and leaves no files."""
     (tmp_path / "file").write_text("")
     (tmp_path / "folder.json").mkdir()
     told = []

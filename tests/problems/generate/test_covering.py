@@ -5,14 +5,14 @@ from alloc.problems import InputError, machine_covering
 
 
 def test_same_seed_same_instance():
-    """The seed alone decides, and another seed gives another instance."""
+    """The same seed gives the same instance, another one another instance."""
     first, again, other = (machine_covering(12, 4, 1, 100, seed) for seed in (3, 3, 4))
     assert np.array_equal(first.ability, again.ability)
     assert not np.array_equal(first.ability, other.ability)
 
 
 def test_abilities_and_workloads_lie_in_their_ranges():
-    """Whole abilities in the range asked for; workloads all 1000, or whole from 200 to 2000."""
+    """Abilities are integers in the given range, workloads are all 1000, or integers from 200 to 2000."""
     equal, unequal = (machine_covering(400, 100, 20, 50, 0, equal=equal) for equal in (True, False))
     assert np.array_equal(equal.ability, unequal.ability)
     assert set(equal.ability) == set(range(20, 51))
@@ -24,14 +24,14 @@ def test_abilities_and_workloads_lie_in_their_ranges():
 
 
 def test_real_abilities():
-    """Where they need not be whole, hardly one is."""
+    """Real abilities are rarely integers."""
     ability = machine_covering(50, 20, 1, 100, 0, whole=False).ability
     assert (ability != np.round(ability)).all()
     assert ((ability >= 1) & (ability <= 100)).all()
 
 
 def test_restricted_agents_have_few_choices():
-    """With choices abilities are the same, and agents may take up to so many tasks, one of them by their number."""
+    """With choices, abilities are the same, and agents may take at most that many tasks, one by their number."""
     free, restricted = machine_covering(20, 6, 1, 9, 0), machine_covering(20, 6, 1, 9, 0, choices=3)
     assert np.array_equal(free.ability, restricted.ability)
     assert free.allowed_tasks is None
@@ -46,6 +46,6 @@ def test_restricted_agents_have_few_choices():
     "arguments", [(0, 1, 1, 9, 0), (1, 0, 1, 9, 0), (1, 1, 0, 9, 0), (1, 1, 5, 4, 0), (1, 1, 1, 9, -1)]
 )
 def test_numbers_out_of_range_are_refused(arguments):
-    """Each number has its least value."""
+    """Numbers below their minimum are errors."""
     with pytest.raises(InputError, match="must be"):
         machine_covering(*arguments)

@@ -1,4 +1,4 @@
-"""Generated instances: what the paper says of its scenarios, and what a family promises."""
+"""Generated instances agree with the paper's scenarios and with the parameters of families."""
 
 from typing import Any
 
@@ -52,7 +52,7 @@ def test_what_the_paper_leaves_open(scenario: int) -> None:
 
 
 def test_large_abilities_occur() -> None:
-    """The total is reached by moving single agents, not all alike: with mean 4, abilities up to 10 are left."""
+    """The total is reached by changing single abilities: with mean 4, abilities up to 10 remain."""
     counts = sum(np.bincount(paper(1, seed).ability.astype(int), minlength=11) for seed in range(100))
     assert (counts[1:] > 0).all()
     assert counts[1] == counts.max()
@@ -68,7 +68,7 @@ def test_seeds() -> None:
 @settings(max_examples=50, deadline=None)
 @given(st.data())
 def test_paper_like_of_any_size(data: st.DataObject) -> None:
-    """Wherever such abilities and workloads exist, they are found, extreme totals included."""
+    """Instances are found for all feasible totals, including extreme ones."""
     n = data.draw(st.integers(1, 60))
     total = data.draw(st.integers(n, 10 * n))
     m = data.draw(st.integers(1, int((2 * total + 0.25) ** 0.5 - 0.5)))
@@ -97,7 +97,7 @@ def test_the_load_is_met(ability: str, workload: str, integer: bool) -> None:
 
 
 def test_ability_limits() -> None:
-    """Uniform abilities fill their limits, lognormal ones leave them at times, Pareto ones have no upper end."""
+    """Uniform abilities fill their range, lognormal ones sometimes exceed it, Pareto ones have no upper limit."""
     limits: dict[str, Any] = {"agents": 5000, "integer": False, "ability_min": 2, "ability_max": 8}
     uniform = random_instance(Family(**limits), 1).ability
     assert (2 <= uniform.min() < 2.1, 7.9 < uniform.max() <= 8) == (True, True)
@@ -114,7 +114,7 @@ def test_ability_limits() -> None:
 @pytest.mark.parametrize("sites", ["uniform", "clustered"])
 @pytest.mark.parametrize("starts", ["tasks", "own", "depots", "unknown"])
 def test_places(dimensions: int, sites: str, starts: str) -> None:
-    """Sites and starts lie in the world, in as many dimensions, as few places or at the tasks as asked for."""
+    """Sites and starts are in the world, with the given dimensions, depots or tasks."""
     family = Family(dimensions=dimensions, sites=sites, starts=starts, world_size=50, depots=3)
     instance = random_instance(family, 2)
     for positions in (instance.task_position, instance.start_position):
@@ -141,7 +141,7 @@ def test_clusters_are_denser() -> None:
 
 
 def test_limits_and_lists() -> None:
-    """One number is for all, two are the ends of a range, None is no limit; each agent gets its share of the tasks."""
+    """A number applies to all, two are a range, None is no limit; each agent gets its share of the tasks."""
     family = Family(communication_range=0.5, battery=(1, 2), speed=None, priority=(0, 3), allowed_fraction=0.3, tau=0.9)
     instance = random_instance(family, 4, name="mine")
     assert instance.name == "mine"
@@ -186,7 +186,7 @@ WRONG: list[tuple[dict[str, Any], str]] = [
 
 @pytest.mark.parametrize(("fields", "place"), WRONG)
 def test_families_that_make_no_sense(fields: dict[str, Any], place: str) -> None:
-    """Each parameter out of its range is refused, by its name."""
+    """Parameters out of their range are errors that name them."""
     with pytest.raises(InputError) as caught:
         Family(**fields)
     assert caught.value.place == place
@@ -209,7 +209,7 @@ def test_families_that_make_no_sense(fields: dict[str, Any], place: str) -> None
     ],
 )
 def test_what_cannot_be_generated(make: Any, place: str) -> None:
-    """Scenarios, seeds and totals that do not exist are refused, by name."""
+    """Invalid scenarios, seeds and totals are errors that name the parameter."""
     with pytest.raises(InputError) as caught:
         make()
     assert caught.value.place == place

@@ -1,4 +1,4 @@
-"""Fewest unserved tasks, serving them, and who competes for whom; brute force as oracle."""
+"""Fewest unserved tasks, repair of allocations, and competing tasks, compared with brute force."""
 
 from itertools import combinations
 
@@ -19,7 +19,7 @@ from alloc.problems import (
 
 
 def can_all_be_served(instance: Instance, tasks: tuple[int, ...]) -> bool:
-    """Try all ways to give each of `tasks` an agent of its own."""
+    """Return whether each of `tasks` can have its own agent, by brute force."""
     _, able = reachable(instance)
 
     def place(rest: tuple[int, ...], used: frozenset[int]) -> bool:
@@ -32,13 +32,13 @@ def can_all_be_served(instance: Instance, tasks: tuple[int, ...]) -> bool:
 
 @given(instances(most_agents=4, most_tasks=3))
 def test_fewest_unserved_is_that_of_brute_force(instance: Instance) -> None:
-    """Matching finds the number that trying all allocations finds."""
+    """The number by matching equals that by brute force."""
     assert fewest_unserved(instance) == brute_force(instance).unserved
 
 
 @given(allocated())
 def test_serve_all(case: tuple[Instance, Allocation]) -> None:
-    """The fewest tasks are unserved afterwards, those that were served still are, and nobody breaks a rule."""
+    """Afterwards the fewest tasks are unserved, served ones stay served, and all rules hold."""
     instance, allocation = case
     served_before = np.flatnonzero(evaluate(instance, allocation).group_ability > 0)
     answer = serve_all(instance, allocation)
@@ -59,7 +59,7 @@ def test_serve_all_leaves_complete_plans_alone(case: tuple[Instance, Allocation]
 
 @given(instances())
 def test_the_unservable_set_is_inclusion_minimal(instance: Instance) -> None:
-    """They cannot all be served, the rest of them can without any one, and one agent too few can take any of them."""
+    """The set cannot be served, but every proper subset can, and one agent too few can take any of its tasks."""
     tasks = minimal_unservable_set(instance)
     needed = tuple(np.flatnonzero(instance.workload > 0).tolist())
     assert (tasks is None) == can_all_be_served(instance, needed)
@@ -80,13 +80,13 @@ def test_contested_by_hand(contested: Instance) -> None:
 
 
 def test_augmenting_path_by_hand() -> None:
-    """Task 2 has agent 0 alone, which must leave task 0 to agent 1, which must leave task 1 to the idle agent 2."""
+    """Task 2 needs agent 0, which must leave task 0 to agent 1, which must leave task 1 to the idle agent 2."""
     instance = Instance(ability=[1, 1, 1], workload=[1, 1, 1], allowed_tasks=[[0, 2], [0, 1], [1]])
     assert serve_all(instance, Allocation([0, 1, -1])) == Allocation([2, 0, 1])
 
 
 def test_idle_agents_are_taken_first() -> None:
-    """A task is given an idle agent, the nearest of them, before one that works."""
+    """A task gets the nearest idle agent before a working one."""
     instance = Instance(
         ability=[1, 1, 1, 1],
         workload=[9, 1],
@@ -98,7 +98,7 @@ def test_idle_agents_are_taken_first() -> None:
 
 @pytest.mark.parametrize("agents", [1, 2, 5])
 def test_without_limits_the_count_decides(agents: int) -> None:
-    """Where everyone can go everywhere, n agents serve n tasks."""
+    """If all agents can take all tasks, n agents serve n tasks."""
     instance = Instance(ability=np.ones(agents), workload=[1, 0, 1, 1])
     assert fewest_unserved(instance) == max(0, 3 - agents)
     assert len(evaluate(instance, serve_all(instance, Allocation.idle(instance))).unserved_tasks) == max(0, 3 - agents)
@@ -106,7 +106,7 @@ def test_without_limits_the_count_decides(agents: int) -> None:
 
 @pytest.mark.parametrize(("agents", "tasks", "lists"), [(40, 60, 2), (60, 60, 2), (55, 60, 3), (1000, 2000, 50)])
 def test_failed_searches_mislead_no_later_one(agents: int, tasks: int, lists: int) -> None:
-    """Where many tasks cannot be served, each of the others is; and thousands of searches in vain cost little."""
+    """All servable tasks are served, and thousands of failed searches are cheap."""
     rng = np.random.default_rng(agents)
     for _ in range(5):
         allowed = rng.integers(0, tasks, (agents, lists)).tolist()

@@ -1,4 +1,4 @@
-"""Who serves which of the competing tasks; brute force as oracle."""
+"""Assignment of agents to competing tasks, compared with brute force."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ from alloc.problems import Allocation, Instance, evaluate, find_shortage
 
 @given(instances(most_agents=4, most_tasks=5))
 def test_shortage_is_that_of_brute_force(instance: Instance) -> None:
-    """It is there where tasks stay unserved; the bound is none too high, and the optimum where nothing is left."""
+    """There is a shortage if tasks stay unserved; its bound is valid, and the optimum if nothing else is left."""
     best, shortage = brute_force(instance), find_shortage(instance)
     assert (shortage is None) == (best.unserved == 0)
     if shortage is not None:
@@ -42,7 +42,7 @@ def test_by_hand() -> None:
 
 
 def test_no_time_still_serves_as_many_as_can_be() -> None:
-    """Without any time the matching is not improved, but it is one."""
+    """Without time the matching is not improved, but is still valid."""
     rng = np.random.default_rng(1)
     lists = [rng.permutation(60)[:8].tolist() for _ in range(20)]
     instance = Instance(ability=rng.uniform(1, 9, 20), workload=rng.uniform(1, 9, 60), allowed_tasks=lists)

@@ -1,4 +1,4 @@
-"""Far more tasks than agents: as many are served as can be, within the time limit."""
+"""With far more tasks than agents, as many as possible are served within the time limit."""
 
 import time
 from collections.abc import Callable
@@ -46,7 +46,7 @@ def test_the_limit_holds_and_every_agent_serves_a_small_task(reach: float, metho
 
 
 def test_without_time_the_note_says_what_is_not_proven() -> None:
-    """No time is no reason to fail: some tasks are served, and a note says that more might be."""
+    """Without time some tasks are served, and a note says that more might be possible."""
     instance = surplus_of_tasks(0.02)
     result = solve(instance, "greedy", time_limit_s=0)
     assert result.evaluation is not None
@@ -56,7 +56,7 @@ def test_without_time_the_note_says_what_is_not_proven() -> None:
 
 @given(st.integers(0, 10**6))
 def test_agents_in_excess_here_and_tasks_there(seed: int) -> None:
-    """Where agents are idle in one place and tasks unserved in another, a run without a table serves the most tasks."""
+    """With idle agents in one place and unserved tasks in another, a run without a table serves the most tasks."""
     rng = np.random.default_rng(seed)
     instance = surplus_of_tasks(0.15, 30, 60)
     lists = [None if rng.random() < 0.7 else rng.integers(0, 60, 2).tolist() for _ in range(30)]
@@ -83,7 +83,7 @@ def test_agents_in_excess_here_and_tasks_there(seed: int) -> None:
 
 @given(st.integers(0, 10**6))
 def test_hopcroft_and_karp_agree_with_scipy(seed: int) -> None:
-    """The matching is one, begins with any other, and is as large as that of another implementation."""
+    """The matching is valid, can start from any other, and is as large as SciPy's."""
     rng = np.random.default_rng(seed)
     rows, columns = rng.integers(1, 12, 2)
     row, column = np.nonzero(rng.random((rows, columns)) < rng.random())
@@ -106,7 +106,7 @@ def test_hopcroft_and_karp_agree_with_scipy(seed: int) -> None:
 
 
 def test_a_sample_has_pairs_of_every_size() -> None:
-    """Small budgets leave each agent small tasks and large ones; large budgets leave all pairs."""
+    """With small budgets each agent has small and large tasks; with large budgets, all pairs."""
     instance = surplus_of_tasks(0.5, 400, 5_000)
     agents, tasks = np.arange(400), np.arange(5_000)
     few, is_all = sampled_pairs(instance, agents, tasks, None, 0.02, lambda: np.inf)
@@ -119,14 +119,14 @@ def test_a_sample_has_pairs_of_every_size() -> None:
 
 
 def looks(number: int) -> Callable[[], float]:
-    """Return a clock that runs out after so many looks."""
+    """Return a clock that runs out after a number of calls."""
     left = iter([1.0] * number)
     return lambda: next(left, 0.0)
 
 
 @pytest.mark.parametrize("number", [0, 1, 2, 5, 20])
 def test_a_matching_ends_with_its_time(number: int) -> None:
-    """When the clock runs out, a matching is returned that nobody calls the largest, and it is one."""
+    """When the clock runs out, a valid matching is returned that is not claimed to be maximum."""
     rng = np.random.default_rng(2)
     row, column = np.nonzero(rng.random((400, 400)) < 0.006)
     first = np.searchsorted(row, np.arange(401))
@@ -139,7 +139,7 @@ def test_a_matching_ends_with_its_time(number: int) -> None:
 
 
 def test_a_long_path_is_left_when_time_runs_out() -> None:
-    """The levels, and the search along the one path, which leads through all rows, look at the clock on their way."""
+    """Computation of levels, and the search along a path through all rows, check the clock."""
     n = 1_000  # row i holds column i - 1 and can take column i besides; row 0 holds none
     first = np.concatenate([[0], 1 + 2 * np.arange(n)])
     column = np.concatenate([[0], (np.arange(1, n)[:, None] + [-1, 0]).ravel()])
@@ -153,7 +153,7 @@ def test_a_long_path_is_left_when_time_runs_out() -> None:
 
 @pytest.mark.parametrize("table", [True, False])
 def test_serving_ends_with_its_time(table: bool) -> None:
-    """Tasks stay unserved when the clock runs out, those served before stay served, and without a limit all are."""
+    """When the clock runs out tasks stay unserved, served ones stay served; without a limit all are served."""
     rng = np.random.default_rng(3)
     place = rng.random((60, 2))
     instance = Instance(
@@ -177,7 +177,7 @@ def test_serving_ends_with_its_time(table: bool) -> None:
 
 
 def test_no_proof_without_time(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Whether tasks compete takes a matching, also in a table; without time it is not claimed that any does."""
+    """Proving that tasks compete takes a matching; without time it is not claimed."""
     instance = surplus_of_tasks(0.1, 40, 30)
     assert find_shortage(instance) is not None
     assert find_shortage(instance, lambda: 0.0) is not None  # small: found out all the same
@@ -186,7 +186,7 @@ def test_no_proof_without_time(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_clocks() -> None:
-    """A share of the time ends before the time does, and a least time lasts when there is none."""
+    """A share of the time ends before the time does, and a minimum time applies even without time left."""
     left = iter([10.0, 10.0, 6.0, 5.0])
     part = share_of(0.5, lambda: next(left))
     assert [part(), part(), part()] == [5.0, 1.0, 0.0]

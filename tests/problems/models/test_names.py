@@ -6,7 +6,7 @@ from alloc.problems.models.names import LONGEST, plain_names
 
 @given(st.lists(st.text(alphabet="ab_ é1", min_size=1, max_size=6), unique=True, max_size=20))
 def test_names_are_unique_and_plain(ids: list[str]) -> None:
-    """No two ids have one name; names have no double underscore; an id that is such a name keeps it."""
+    """Names are unique and have no double underscore; an id that is a valid name is kept."""
     names = plain_names(ids, "agent")
     assert len(set(names)) == len(ids)
     assert all(name.isascii() and name.replace("_", "a").isalnum() and "__" not in name for name in names)
@@ -16,7 +16,7 @@ def test_names_are_unique_and_plain(ids: list[str]) -> None:
 
 
 def test_long_ids_are_cut() -> None:
-    """Ids of hundreds of letters that agree at their beginning have short names, and different ones."""
+    """Long ids with equal beginnings have short and different names."""
     names = plain_names(["a" * 300, "a" * 301, "a" * 40], "agent")
     assert names[2] == "a" * LONGEST
     assert len(set(names)) == 3

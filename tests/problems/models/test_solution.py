@@ -1,4 +1,4 @@
-"""Solutions as solvers write them are read as allocations."""
+"""Solution files of solvers are read as allocations."""
 
 from pathlib import Path
 
@@ -62,7 +62,7 @@ SOLVERS = {"highs": HIGHS, "highs-pretty": HIGHS_PRETTY, "cbc": CBC, "gurobi": G
 
 @pytest.mark.parametrize("solver", SOLVERS)
 def test_counts_of_every_solver_are_spread(tmp_path: Path, solver: str) -> None:
-    """The agents of a class are those that its count sends, whoever wrote the file, and however it is called."""
+    """Counts of a class are assigned to its agents, for files of all solvers and any names."""
     path = tmp_path / "answer.txt"
     path.write_text(SOLVERS[solver].format(value="0.9999999"))
     assert read_allocation(path, INSTANCE) == (Allocation([0, 0, 0]), None)
@@ -70,7 +70,7 @@ def test_counts_of_every_solver_are_spread(tmp_path: Path, solver: str) -> None:
 
 @pytest.mark.parametrize("solver", SOLVERS)
 def test_fractions_are_told(tmp_path: Path, solver: str) -> None:
-    """Half an agent is a relaxation, and no allocation."""
+    """Fractional values are refused as the solution of a relaxation."""
     path = tmp_path / "answer.sol"
     path.write_text(SOLVERS[solver].format(value="0.5"))
     with pytest.raises(InputError, match=r"answer\.sol: line \d+: 0\.5 is not a number of agents"):
@@ -103,7 +103,7 @@ def test_fractions_are_told(tmp_path: Path, solver: str) -> None:
     ],
 )
 def test_broken_solutions_are_one_line(tmp_path: Path, text: str, message: str) -> None:
-    """What is no solution of a model of this instance is told, with its line."""
+    """Files that are not a solution of a model of this instance are refused with the line."""
     path = tmp_path / "answer.sol"
     path.write_text(text)
     with pytest.raises(InputError) as caught:
@@ -113,7 +113,7 @@ def test_broken_solutions_are_one_line(tmp_path: Path, text: str, message: str) 
 
 
 def test_no_agent_at_work_is_a_solution(tmp_path: Path) -> None:
-    """SCIP leaves zeros out: what remains may be y alone, and everyone is idle."""
+    """As SCIP leaves zeros out, a file may contain only y, and all agents are idle."""
     path = tmp_path / "answer.sol"
     path.write_text("solution status: optimal solution found\ny 1e-9 (obj:1)\n")
     assert read_allocation(path, INSTANCE)[0] == Allocation.idle(INSTANCE)

@@ -1,4 +1,4 @@
-"""Spreadsheets as people write them are read rightly, or refused in one line."""
+"""Realistic spreadsheets are read correctly, or refused in one line."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -15,7 +15,7 @@ from alloc.problems.tables.grid import Grid
 
 
 def imported(case: Case, folder: Path) -> tuple[Instance, list[str]]:
-    """Return the instance of a case, and the lines about its columns, files by their names alone."""
+    """Return the instance of a case, and the lines about its columns, with file names without folders."""
     lines: list[str] = []
     *grids, bases = [None if path is None else read_grid(path) for path in case.write(folder)]
     instance = Instance.from_tables(*grids, report=lines.append, bases=bases, **case.options)
@@ -45,7 +45,7 @@ def found(instance: Instance, name: str) -> object:
 
 
 def check(case: Case, folder: Path) -> None:
-    """Check one spreadsheet against what must come of it."""
+    """Check one spreadsheet against the expected instance or error."""
     if case.error:
         with pytest.raises(InputError) as raised:
             imported(case, folder)
@@ -58,26 +58,26 @@ def check(case: Case, folder: Path) -> None:
 
 @pytest.mark.parametrize("case", TEXTS, ids=lambda case: case.name)
 def test_text_is_imported_or_refused(case: Case, tmp_path: Path) -> None:
-    """Each text file gives the fields that a person would read from it, or one line that says what to mend."""
+    """Each text file gives the expected fields, or one line that says what to correct."""
     check(case, tmp_path)
 
 
 @pytest.mark.needs("openpyxl")
 @pytest.mark.parametrize("case", WORKBOOKS, ids=lambda case: case.name)
 def test_workbooks_are_imported_or_refused(case: Case, tmp_path: Path) -> None:
-    """The same of workbooks, with merged cells, titles and numbers that became dates."""
+    """Workbooks with merged cells, titles and numbers converted to dates give the expected fields or errors."""
     check(case, tmp_path)
 
 
 def test_there_are_spreadsheets_enough() -> None:
-    """Sixty spreadsheets at the least, and none twice."""
+    """There are at least sixty spreadsheets, all different."""
     names = [case.name for case in [*TEXTS, *WORKBOOKS]]
     assert len(set(names)) == len(names) >= 60
 
 
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "utf-16-le", "utf-16-be", "latin-1", "cp1252"])
 def test_all_spellings_of_a_table_are_the_same(encoding: str, tmp_path: Path) -> None:
-    """Whatever the separator, the encoding, the decimal mark and the line ends, the same fleet comes out."""
+    """The same fleet is read with any separator, encoding, decimal mark and line ends."""
     for separator in (";", "\t", ",", "|"):
         for mark in (",", "."):
             for end in ("\n", "\r\n", "\r"):
@@ -134,14 +134,14 @@ def test_distances_are_dicts_too() -> None:
     ],
 )
 def test_what_is_no_table_is_refused(agents: object, line: str) -> None:
-    """From Python too, errors name the argument, the row and the column."""
+    """Errors for data from Python name the argument, the row and the column."""
     with pytest.raises(InputError) as raised:
         Instance.from_tables(agents, {"workload": [1]})
     assert str(raised.value) == line
 
 
 def refusal(read: Callable[[], Grid]) -> str:
-    """Return the line with which a table of agents is refused, nothing if it is taken."""
+    """Return the error for a table of agents, empty if it is accepted."""
     try:
         Instance.from_tables(read(), {"workload": [1]})
     except InputError as error:
@@ -151,7 +151,7 @@ def refusal(read: Callable[[], Grid]) -> str:
 
 @given(st.binary(max_size=60), st.sampled_from(["", "id,ability\n", "id;ability;x;y\n1;2;"]))
 def test_no_bytes_are_a_defect(tmp_path_factory: pytest.TempPathFactory, data: bytes, start: str) -> None:
-    """Whatever is in a file, an instance comes out or an error of one line."""
+    """Any bytes give an instance or a one-line error."""
     path = tmp_path_factory.getbasetemp() / "agents.csv"
     path.write_bytes(start.encode() + data)
     assert refusal(lambda: read_grid(path)).isprintable()
@@ -166,7 +166,7 @@ HEADINGS = ["id", "ability", "Payload", "x", "y", "lat", "lon", "GPS", "Location
     st.lists(st.lists(st.sampled_from(CELLS), max_size=6), max_size=4),
 )
 def test_no_cells_are_a_defect(header: list[str], rows: list[list[str]]) -> None:
-    """Whatever is in the cells under known headers, an instance comes out or an error of one line."""
+    """Any cells under known headers give an instance or a one-line error."""
     grid = Grid("agents.csv", [list(header), *[[cell or None for cell in row] for row in rows]], [*"01234"])
     assert refusal(lambda: grid).isprintable()
 
@@ -185,7 +185,7 @@ def test_sheets_are_named_or_the_first(tmp_path: Path) -> None:
 
 @pytest.mark.needs("openpyxl")
 def test_hidden_rows_are_told(tmp_path: Path) -> None:
-    """Rows that a filter hides are read, and it says so; what is no workbook is refused."""
+    """Rows hidden by a filter are read, with a note; files that are not workbooks are refused."""
     from openpyxl import load_workbook
 
     path = tmp_path / "fleet.xlsx"
