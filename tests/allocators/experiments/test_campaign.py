@@ -153,7 +153,7 @@ def test_timed_runs_have_processors_of_their_own(plugin, monkeypatch):
 def test_more_timed_runs_than_processors_are_refused(plugin):
     """Timed runs that would share a processor are refused before anything runs."""
     many = len(os.sched_getaffinity(0)) + 1
-    with Store(plugin / "runs.db") as store, pytest.raises(InputError, match=r"workers: \d+ timed runs"):
+    with Store(plugin / "runs.db") as store, pytest.raises(InputError, match=r"workers: \d+ parallel timed runs"):
         Campaign(store, [job("answer", time_limit_s=1.0)], Resources(workers=many))
 
 

@@ -205,11 +205,11 @@ def test_a_full_disk_is_one_line_and_loses_nothing(alloc, plugin):
         (("--store", "runs.db", "--memory", "4M"), "must be at least 100M"),
         (("--store", "runs.db", "--kill-after", "0"), "must be more than 0 seconds"),
         (("--store", "runs.db", "--time-limit", "1", "--workers", "999"), "--workers: 999 parallel timed runs"),
-        (("--store", "absent/runs.db"), "absent/runs.db: cannot be opened"),
+        (("--store", "absent/runs.db"), "absent/runs.db: there is no folder 'absent'"),
         (("--store", "runs.db", "--report", "runs.txt"), "runs.txt: must end in .md, .tex, .csv or .parquet"),
         (("--store", "runs.db", "--csv", "runs.db"), "is --store and --csv at once"),
         (("--store", "text"), "text: is not a store of runs"),
-        (("--store", "."), ".: cannot be opened"),
+        (("--store", "."), ".: is a folder where a file is expected"),
     ],
 )
 def test_wrong_options_are_one_line(alloc, words, message):
