@@ -51,7 +51,7 @@ def test_unserved_tasks_give_exit_code_1(alloc, unservable):
         (("--add", "a1"), """--add: must be "like ID\""""),
         (("--add", "like a9"), "--add: no agent 'a9'"),
         (("--remove", "a9"), "--remove: no agent 'a9'"),
-        ((), "--add: names no agent"),
+        ((), "--add: needs an agent"),
         (("--add", "like a1", "--plot", "p.gif"), "p.gif: must end in"),
     ],
 )
