@@ -154,11 +154,12 @@ def _start(problem: "Instance", file: str) -> "dict[str, str | None]":
     from alloc.problems.formats.messages import told
 
     plan = read_plan(file, problem)
+    given = plan.assignment()
     try:
-        Allocation.carried_over(problem, plan.assignment())
+        Allocation.carried_over(problem, given)
     except InputError as error:
         raise told(error, plan.source) from error.__cause__
-    return plan.assignment()
+    return given
 
 
 def _pins(problem: "Instance", pairs: list[str] | None, file: str | None, *, quiet: bool) -> dict[str, str | None]:
