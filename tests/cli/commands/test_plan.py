@@ -116,13 +116,13 @@ def test_it_goes_on_from_its_state(alloc, pair):
     assert answers(again.out)[0]["orders"] == answers(first.out)[0]["orders"]
     ran = alloc(*arguments, "pair.json")
     assert (ran.code, ran.out) == (2, "")
-    assert "state.json is there: the planner in it goes on" in ran.err
+    assert "planning resumes from state.json" in ran.err
 
 
 def test_wrong_arguments_are_told_before_any_line(alloc, pair):
     """An unknown policy or file gives one line and exit code 2."""
     for arguments, told in (
-        (("pair.json",), "--stdio: is needed"),
+        (("pair.json",), "--stdio: is required"),
         (("pair.json", "--stdio", "--state", "absent/state.json"), "there is no folder 'absent'; create it first"),
         (("pair.json", "--stdio", "--state", "pair.json"), "pair.json: is MISSION and --state at once"),
         (("pair.json", "--stdio", "--policy", "gredy"), "did you mean 'greedy'?"),
