@@ -37,7 +37,7 @@ def test_energy_needs_a_makespan(alloc, small):
     """Minimising energy requires a makespan; the error names the option, and no file is left."""
     ran = alloc("export", "small.json", "--objective", "makespan-energy", "--output", "m.lp")
     assert (ran.code, ran.out) == (2, "")
-    assert ran.err.startswith("alloc: --makespan: is needed")
+    assert ran.err.startswith("alloc: --makespan: is required")
     assert not Path("m.lp").exists()
     ran = alloc("export", "small.json", "--objective", "makespan-energy", "--makespan", "1.2", "--output", "m.lp")
     assert ran.code == 0

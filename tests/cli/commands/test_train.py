@@ -188,7 +188,7 @@ def test_what_is_wrong_in_any_case_comes_first(alloc, more, message):
         (("--output", "new", "--log", "new"), "new: is --output and --log at once"),
         (("--output", "q.pt"), "q.pt: has the suffix '.pt', but policies are safetensors; end it in .safetensors"),
         (("--output", "q.safetensors.gz"), "q.safetensors.gz: has the suffix '.gz', but policies are safetensors"),
-        (("--output", ""), "'': is not a name of a file"),
+        (("--output", ""), "'': is not a file name"),
         (("--output", "-"), "policy, checkpoint and log must be files"),
     ],
 )
