@@ -97,9 +97,10 @@ def _is_log(path: Path) -> bool:
 
 def _is_policy(path: Path) -> bool:
     try:
-        return "networks" in read_header(path)
+        header = read_header(path)
     except InputError:
         return False
+    return "networks" in header or header.get("format", "").startswith("alloc-mission-policy/")
 
 
 def _generations(checkpoint: Path) -> int:

@@ -1,0 +1,20 @@
+"""Files of a training: a run that goes on overwrites its own policy, and no other file."""
+
+from pathlib import Path
+
+import pytest
+
+from alloc.allocators.learned.files.run_files import RunFiles
+from alloc.allocators.learned.missions.policy_file import SHIPPED
+from alloc.problems import InputError
+
+
+def test_a_training_in_missions_goes_on_over_its_policy(tmp_path: Path) -> None:
+    """Policies of missions are told from other safetensors, so that such a training can be resumed."""
+    files = RunFiles.beside(tmp_path / "p.safetensors", None, None, None)
+    files.policy.write_bytes(SHIPPED.read_bytes())
+    files.checkpoint.touch()
+    files.check(resume=True)
+    files.policy.write_bytes(b"something else")
+    with pytest.raises(InputError, match="no policy file"):
+        files.check(resume=True)
