@@ -1,10 +1,17 @@
-"""Greedy insertion of tasks into routes: next is always the task with the least cost per weight."""
+"""Greedy insertion of tasks into routes: next is the task with the least cost per weight, or the earliest deadline."""
 
 # ruff: noqa: NPY002 - compiled code seeds numba's own generator
 
 import numpy as np
 
-from alloc.allocators.online.routes.insertion import hours_of_work, insert, is_hopeless, place_between
+from alloc.allocators.online.routes.insertion import (
+    hours_of_work,
+    insert,
+    insert_best,
+    insert_coalition,
+    is_hopeless,
+    place_between,
+)
 from alloc.allocators.online.routes.record import Schedule
 from alloc.allocators.online.routes.situation import Floats, Ints, Situation
 from alloc.allocators.runtime.compiled import compiled, inlined
@@ -93,3 +100,46 @@ def _cost_at(
     if arrives >= s.tasks[j].deadline or leaves > s.tasks[j].deadline or leaves > latest:
         cost = np.inf
     return cost, leaves
+
+
+@compiled
+def insert_by_deadline(
+    s: Situation,
+    r: Schedule,
+    routes: Ints,
+    lengths: Ints,
+    slack: Floats,
+    waiting: Ints,
+    size: float,
+    balance: float,
+    meets_at_once: bool,
+) -> None:
+    """Put tasks where one agent can do them in time, those first that are due first; then seek coalitions for others.
+
+    Parameters
+    ----------
+    waiting : ndarray of int, shape (k,)
+        The tasks.
+    size : float
+        By how many times the hours that one agent needs for it a task comes later, as large ones take the time of
+        several small ones.
+    balance : float
+        As for `insert_best`.
+    meets_at_once : bool
+        Whether a coalition is sought before tasks are put in that are due later: for plenty of agents.
+    """
+    ability, weight = np.mean(s.agents.ability) * s.pace, 1.0 / len(s.tasks)
+    key = np.empty(len(waiting))
+    for k in range(len(waiting)):
+        task = s.tasks[waiting[k]]
+        key[k] = task.deadline + size * task.left / ability * weight / task.weight
+    order = waiting[np.argsort(key)]
+    for k in range(len(order)):
+        if insert_best(s, r, routes, lengths, slack, order[k], balance, 0.0):
+            order[k] = -1
+        elif meets_at_once and s.tasks[order[k]].deadline < np.inf:
+            insert_coalition(s, r, routes, lengths, slack, order[k])
+            order[k] = -1
+    for k in range(len(order)):
+        if order[k] >= 0 and s.tasks[order[k]].deadline < np.inf:
+            insert_coalition(s, r, routes, lengths, slack, order[k])

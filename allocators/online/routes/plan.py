@@ -9,7 +9,7 @@ import numpy as np
 from alloc.allocators.online.routes.describe import Described
 from alloc.allocators.online.routes.evaluation import play
 from alloc.allocators.online.routes.record import Schedule, new_schedule
-from alloc.allocators.online.routes.search import improve
+from alloc.allocators.online.routes.search import WAYS, improve
 from alloc.allocators.online.routes.situation import (
     AGENT,
     EUCLIDEAN,
@@ -27,6 +27,9 @@ PORTION, PORTION_S = 8, 0.001
 
 MOST_GROWTH, CAUTION = 4.0, 0.5
 """Largest growth factor of the batch of tasks inserted at once, and safety factor on the estimated batch size."""
+
+TIMED_WAYS = 2
+"""Ways in which tasks are put in where time is limited."""
 
 TOLERATED = 0.05
 """Relative amount by which an accepted plan may initially be worse than the best one; it decreases to 0."""
@@ -81,6 +84,7 @@ def improved(
     done, began = 0, time.perf_counter()
     portion, hour = iterations if until is None else PORTION, began
     size = len(waiting) if until is None else max(PORTION, n)
+    ways = WAYS if until is None else TIMED_WAYS
     while len(waiting) or done < iterations:
         share = 0.0 if until is None else min(1.0, (hour - began) / max(1e-9, until - began))
         tolerated = TOLERATED * (1 - share), 0.0 if until is None else TOLERATED * (1 - share)
@@ -89,7 +93,7 @@ def improved(
         is_last = len(waiting) <= size
         portion = min(portion, iterations - done) if is_last else 0
         plan, number = (routes, lengths), (seed + 7919 * (done + len(waiting[size:]))) % 2**31
-        improve(situation, pair, described.nearest, plan, portion, number, fresh, tolerated)
+        improve(situation, pair, described.nearest, plan, portion, number, fresh, ways, tolerated)
         waiting, done, last, hour = waiting[size:], done + portion, hour, time.perf_counter()
         if until is not None and hour >= until:
             break
@@ -133,7 +137,7 @@ def warm_up() -> None:
     )
     plan = np.zeros((1, 1), np.int64), np.zeros(1, np.int64)
     pair = _new_schedules(situation, plan[0])
-    improve(situation, pair, np.zeros((1, 1), np.int64), plan, 1, 0, np.ones(1, np.bool_), (0.0, 0.0))
+    improve(situation, pair, np.zeros((1, 1), np.int64), plan, 1, 0, np.ones(1, np.bool_), 1, (0.0, 0.0))
     first_tasks(situation, *plan)
 
 

@@ -4,7 +4,7 @@
 
 import numpy as np
 
-from alloc.allocators.online.routes.cheapest import insert_cheapest
+from alloc.allocators.online.routes.cheapest import insert_by_deadline, insert_cheapest
 from alloc.allocators.online.routes.evaluation import copy_touched, play, replay
 from alloc.allocators.online.routes.insertion import find_slack, insert_best, insert_coalition, tidy
 from alloc.allocators.online.routes.moves import change
@@ -21,6 +21,16 @@ work, if some are missed: agents that finish earlier have time for more."""
 
 RUIN, BLINK = 0.5, 0.02
 """Probability of a ruin-and-recreate step, and of skipping a position in insertion (blink)."""
+
+BALANCE = 0.1
+"""What the end of a route counts beside the time that a task takes from it where tasks are put in by deadline."""
+
+SIZES = (0.0, 0.0, 6.0, 12.0)
+"""By how many times the hours that one agent needs for it a task comes later where tasks are put in by deadline; at the
+first of these coalitions are sought at once."""
+
+WAYS = len(SIZES) + 1
+"""Ways to put tasks in, of which the last is always the one that takes least time for its weight."""
 
 Plan = tuple[Ints, Ints]
 """Routes and their lengths."""
@@ -164,6 +174,38 @@ def _waiting(
 
 
 @compiled
+def _put_in(
+    s: Situation,
+    pair: tuple[Schedule, Schedule],
+    nearest: Ints,
+    plan: Plan,
+    before: Plan,
+    slack: Floats,
+    fresh: Bools,
+    ways: int,
+) -> None:
+    """Put tasks into a plan in the way, of so many, that is best; the second schedule stays that of the plan before."""
+    r, trial_r = pair
+    routes, lengths = plan
+    best, kept, kept_lengths = np.inf, routes.copy(), lengths.copy()
+    waiting = np.flatnonzero(fresh)
+    for way in range(ways):
+        if way == len(SIZES):
+            rebuild(s, trial_r, nearest, plan, before, slack, fresh, False)
+        else:
+            for i in range(len(lengths)):
+                find_slack(s, trial_r, routes, lengths, slack, i)
+            insert_by_deadline(s, trial_r, routes, lengths, slack, waiting, SIZES[way], BALANCE, way == 0)
+        replay(s, trial_r, routes, lengths, *before)
+        reached = value(s, trial_r)
+        if reached < best:
+            best = reached
+            kept[:], kept_lengths[:] = routes, lengths
+        copy_touched(trial_r, r, before[0], before[1], trial_r, routes, lengths)
+    routes[:], lengths[:] = kept, kept_lengths
+
+
+@compiled
 def improve(
     s: Situation,
     pair: tuple[Schedule, Schedule],
@@ -172,6 +214,7 @@ def improve(
     iterations: int,
     seed: int,
     fresh: Bools,
+    ways: int,
     tolerated: tuple[float, float],
 ) -> float:
     """Improve routes in place; return their cost.
@@ -190,6 +233,8 @@ def improve(
     seed : int
     fresh : ndarray of bool, shape (m,)
         Tasks to insert into the routes first.
+    ways : int
+        In which that is tried where there are deadlines, 1 to `WAYS`.
     tolerated : tuple of float
         Relative amount by which an accepted plan may be worse than the best one, at the first and the last iteration.
     """
@@ -203,8 +248,11 @@ def improve(
     play(s, trial_r, routes, lengths)
     copy_touched(trial_r, r, now, now_lengths, trial_r, trial, trial_lengths)
     best, undone = value(s, r), max(0.0, r.totals[0])
+    has_deadline = np.isfinite(s.tasks.deadline).any()
     for step in range(-1 if fresh.any() else 0, iterations):
-        if step < 0 or np.random.random() < RUIN:
+        if step < 0 and has_deadline and fresh.sum() > 1:
+            _put_in(s, pair, nearest, (trial, trial_lengths), (now, now_lengths), slack, fresh, ways)
+        elif step < 0 or np.random.random() < RUIN:
             rebuild(s, trial_r, nearest, (trial, trial_lengths), (now, now_lengths), slack, fresh, step >= 0)
         elif not change(s, r, nearest, trial, trial_lengths):
             continue

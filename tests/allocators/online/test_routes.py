@@ -83,6 +83,15 @@ def test_the_search_finds_the_best_plan(family, seed):
     assert worth(known, found)[0] <= best + 1e-6
 
 
+@pytest.mark.parametrize(("agents", "most"), [(20, 35), (40, 10)])
+def test_plans_begin_well_where_tasks_are_due(agents, most):
+    """A first plan does most tasks in time before any search; with the cheapest put in first, 61 and 19 are undone."""
+    known = described(random_cfstp(agents, 300, 1))
+    routes, lengths, _ = improved(known, {}, 0, 0, None)
+    schedule = worth(known, [route[:count].tolist() for route, count in zip(routes, lengths, strict=True)])[1]
+    assert np.count_nonzero(np.isinf(schedule.tasks["finish"])) <= most
+
+
 @pytest.mark.parametrize("family", FAMILIES)
 def test_incremental_schedules_equal_full_ones(family):
     """Agents not affected by a change keep the schedule that scheduling the whole plan would give."""
