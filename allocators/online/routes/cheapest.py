@@ -128,7 +128,7 @@ def insert_by_deadline(
     meets_at_once : bool
         Whether a coalition is sought before tasks are put in that are due later: for plenty of agents.
     """
-    ability, weight = np.mean(s.agents.ability) * s.pace, 1.0 / len(s.tasks)
+    ability, weight = np.mean(s.agents["ability"]) * s.pace, 1.0 / len(s.tasks)
     key = np.empty(len(waiting))
     for k in range(len(waiting)):
         task = s.tasks[waiting[k]]

@@ -28,8 +28,9 @@ PORTION, PORTION_S = 8, 0.001
 MOST_GROWTH, CAUTION = 4.0, 0.5
 """Largest growth factor of the batch of tasks inserted at once, and safety factor on the estimated batch size."""
 
-TIMED_WAYS = 2
-"""Ways in which tasks are put in where time is limited."""
+CROWDED = 0.7
+"""Where all work takes more than this share of the hours up to the last deadline, flights leave no time for all: a
+limited time then goes to the tasks that take least time, and not to those that are due first."""
 
 TOLERATED = 0.05
 """Relative amount by which an accepted plan may initially be worse than the best one; it decreases to 0."""
@@ -45,8 +46,8 @@ def improved(
 ) -> tuple[Ints, Ints, Bools]:
     """Return improved routes, starting from those in force.
 
-    With a time limit, new tasks are inserted in batches, those near an agent first, and no more than time allows;
-    without one, all at once, which yields better plans.
+    With a time limit, new tasks are inserted in batches, no more than time allows: those with early deadlines first, and
+    of others those near an agent. Without one, all at once, which yields better plans.
 
     Parameters
     ----------
@@ -79,12 +80,14 @@ def improved(
     pair = _new_schedules(situation, routes)
     fresh = np.array([task.facts.id not in given_up for task in described.tasks])
     fresh[[j for i in range(n) for j in routes[i, : lengths[i]].tolist()]] = False
-    waiting = np.argsort(situation.start_distance.min(axis=0), kind="stable")
+    is_crowded = _is_crowded(situation)
+    near, deadline = situation.start_distance.min(axis=0), situation.tasks["deadline"]
+    waiting = np.argsort(near, kind="stable") if is_crowded else np.lexsort((near, deadline))
     waiting = waiting[fresh[waiting]]
     done, began = 0, time.perf_counter()
     portion, hour = iterations if until is None else PORTION, began
     size = len(waiting) if until is None else max(PORTION, n)
-    ways = WAYS if until is None else TIMED_WAYS
+    ways = (0, WAYS) if until is None else (WAYS - 1, WAYS) if is_crowded else (0, 2)
     while len(waiting) or done < iterations:
         share = 0.0 if until is None else min(1.0, (hour - began) / max(1e-9, until - began))
         tolerated = TOLERATED * (1 - share), 0.0 if until is None else TOLERATED * (1 - share)
@@ -105,6 +108,16 @@ def improved(
     fresh[:] = False
     fresh[waiting] = True
     return routes, lengths, fresh
+
+
+def _is_crowded(situation: Situation) -> bool:
+    """Return whether there is no time for all tasks that have deadlines."""
+    deadline = situation.tasks["deadline"]
+    is_due = np.isfinite(deadline)
+    if not is_due.any():
+        return True
+    work = situation.tasks["left"][is_due].sum() / (situation.agents["ability"].sum() * situation.pace)
+    return bool(work > CROWDED * (deadline[is_due].max() - situation.hour))
 
 
 def _next_size(size: int, seconds: float, left: float) -> int:
@@ -137,7 +150,7 @@ def warm_up() -> None:
     )
     plan = np.zeros((1, 1), np.int64), np.zeros(1, np.int64)
     pair = _new_schedules(situation, plan[0])
-    improve(situation, pair, np.zeros((1, 1), np.int64), plan, 1, 0, np.ones(1, np.bool_), 1, (0.0, 0.0))
+    improve(situation, pair, np.zeros((1, 1), np.int64), plan, 1, 0, np.ones(1, np.bool_), (0, 1), (0.0, 0.0))
     first_tasks(situation, *plan)
 
 

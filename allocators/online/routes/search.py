@@ -182,14 +182,14 @@ def _put_in(
     before: Plan,
     slack: Floats,
     fresh: Bools,
-    ways: int,
+    ways: tuple[int, int],
 ) -> None:
-    """Put tasks into a plan in the way, of so many, that is best; the second schedule stays that of the plan before."""
+    """Put tasks into a plan in the way, of these, that is best; the second schedule stays that of the plan before."""
     r, trial_r = pair
     routes, lengths = plan
     best, kept, kept_lengths = np.inf, routes.copy(), lengths.copy()
     waiting = np.flatnonzero(fresh)
-    for way in range(ways):
+    for way in range(ways[0], ways[1]):
         if way == len(SIZES):
             rebuild(s, trial_r, nearest, plan, before, slack, fresh, False)
         else:
@@ -214,7 +214,7 @@ def improve(
     iterations: int,
     seed: int,
     fresh: Bools,
-    ways: int,
+    ways: tuple[int, int],
     tolerated: tuple[float, float],
 ) -> float:
     """Improve routes in place; return their cost.
@@ -233,8 +233,8 @@ def improve(
     seed : int
     fresh : ndarray of bool, shape (m,)
         Tasks to insert into the routes first.
-    ways : int
-        In which that is tried where there are deadlines, 1 to `WAYS`.
+    ways : tuple of int
+        Where there are deadlines, the ways of inserting them that are tried: the first one, and the one behind the last.
     tolerated : tuple of float
         Relative amount by which an accepted plan may be worse than the best one, at the first and the last iteration.
     """
@@ -248,7 +248,7 @@ def improve(
     play(s, trial_r, routes, lengths)
     copy_touched(trial_r, r, now, now_lengths, trial_r, trial, trial_lengths)
     best, undone = value(s, r), max(0.0, r.totals[0])
-    has_deadline = np.isfinite(s.tasks.deadline).any()
+    has_deadline = np.isfinite(s.tasks["deadline"]).any()
     for step in range(-1 if fresh.any() else 0, iterations):
         if step < 0 and has_deadline and fresh.sum() > 1:
             _put_in(s, pair, nearest, (trial, trial_lengths), (now, now_lengths), slack, fresh, ways)
