@@ -46,7 +46,7 @@ def improved(
 ) -> tuple[Ints, Ints, Bools]:
     """Return improved routes, starting from those in force.
 
-    With a time limit, new tasks are inserted in batches, no more than time allows: those with early deadlines first, and
+    With a time limit, new tasks are inserted in batches, no more than time allows: early deadlines first, and
     of others those near an agent. Without one, all at once, which yields better plans.
 
     Parameters

@@ -23,14 +23,14 @@ RUIN, BLINK = 0.5, 0.02
 """Probability of a ruin-and-recreate step, and of skipping a position in insertion (blink)."""
 
 BALANCE = 0.1
-"""What the end of a route counts beside the time that a task takes from it where tasks are put in by deadline."""
+"""Weight of the end of a route, relative to the time a task takes from it, where tasks are inserted by deadline."""
 
 SIZES = (0.0, 0.0, 6.0, 12.0)
-"""By how many times the hours that one agent needs for it a task comes later where tasks are put in by deadline; at the
-first of these coalitions are sought at once."""
+"""Where tasks are inserted by deadline, so many times the hours that one agent needs are added to it; with the
+first of these, coalitions are sought at once."""
 
 WAYS = len(SIZES) + 1
-"""Ways to put tasks in, of which the last is always the one that takes least time for its weight."""
+"""Number of ways to insert tasks, of which the last is by least cost per weight."""
 
 Plan = tuple[Ints, Ints]
 """Routes and their lengths."""
@@ -234,7 +234,7 @@ def improve(
     fresh : ndarray of bool, shape (m,)
         Tasks to insert into the routes first.
     ways : tuple of int
-        Where there are deadlines, the ways of inserting them that are tried: the first one, and the one behind the last.
+        Where there are deadlines, the ways of inserting them to try: the first one, and the one after the last.
     tolerated : tuple of float
         Relative amount by which an accepted plan may be worse than the best one, at the first and the last iteration.
     """

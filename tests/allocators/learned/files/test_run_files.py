@@ -16,5 +16,5 @@ def test_a_training_in_missions_goes_on_over_its_policy(tmp_path: Path) -> None:
     files.checkpoint.touch()
     files.check(resume=True)
     files.policy.write_bytes(b"something else")
-    with pytest.raises(InputError, match="no policy file"):
+    with pytest.raises(InputError, match="not a policy file"):
         files.check(resume=True)
