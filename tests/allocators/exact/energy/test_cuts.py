@@ -237,3 +237,37 @@ def test_bound_with_cuts_is_the_least_cost_and_groups_found_have_its_plan():
     plans = [cost[[f, s]].sum() for f in first for s in second if (used[f] + used[s] <= model.count).all()]
     assert min(plans) == 5.0
     assert len(cuts.known_groups(5.5, 1).task) == 1
+
+
+def real_tasks(seed):
+    """Return a model of three tasks and nine agents whose weights depend on the task."""
+    rng, agents, tasks = np.random.default_rng(seed), 9, 3
+    count = np.ones(agents, dtype=np.int64)
+    return EnergyModel(
+        class_of_pair=np.tile(np.arange(agents), tasks), task_of_pair=np.repeat(np.arange(tasks), agents),
+        weight=rng.uniform(0.15, 0.6, agents * tasks), copies=np.ones(agents * tasks, dtype=np.int64),
+        cost=rng.uniform(0.5, 1.5, agents * tasks), need=np.full(tasks, 1 - 1e-10),
+        max_weight=np.full(tasks, -1), count=count, min_agents=0 * count, ability=None,
+    )  # fmt: skip
+
+
+def best_plan(model):
+    """Return the least cost of all plans, each tried, and the groups of the best, shape (p,)."""
+    agents, tasks = len(model.count), len(model.need)
+    weight, cost = (np.vstack([of.reshape(tasks, agents), np.zeros(agents)]) for of in (model.weight, model.cost))
+    plans = np.array(list(product(range(tasks + 1), repeat=agents)))
+    done = [np.where(plans == j, weight[j], 0.0).sum(axis=1) for j in range(tasks)]
+    total = cost[plans, np.arange(agents)].sum(axis=1)
+    total[np.any([part < 1 - 1e-10 for part in done], axis=0)] = np.inf
+    best = int(total.argmin())
+    return float(total[best]), (plans[best] == np.arange(tasks)[:, None]).astype(np.int64).ravel()
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_bound_with_cuts_holds_where_weights_depend_on_the_task(seed):
+    """It is at most the least cost of all plans."""
+    model = real_tasks(seed)
+    least, plan = best_plan(model)
+    cuts = CuttingPlanes(model, np.zeros((0, 3), dtype=bool), np.zeros(9), [plan])
+    cuts.ascend(100, 1.1 * least)
+    assert 0.9 * least <= cuts.bound <= least * (1 + 1e-9)
