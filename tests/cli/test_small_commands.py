@@ -70,7 +70,7 @@ def test_methods_tells_the_parameters_of_one(alloc):
     """`alloc methods NAME` lists its parameters with values, default and meaning, for people and as JSON."""
     ran = alloc("methods", "ga")
     assert (ran.code, ran.out) == (0, "")
-    assert "population               whole number >= 4 or none  none     Individuals" in ran.err
+    assert "population               whole number >= 4 or none  none     Number of individuals" in ran.err
     settings = {one["name"]: one for one in alloc("methods", "lp-round", "--json").json["parameters"]}
     assert settings["time_share"]["values"] == "number > 0, <= 1"
     assert settings["makespan_excess"]["default"] == [0.0, 0.001, 0.003, 0.01, 0.03]

@@ -102,9 +102,9 @@ def test_what_has_no_model_is_refused(tmp_path: Path) -> None:
     """Energy and speeds need a makespan; work that nobody can do, no work, and too many pairs have no model."""
     path = tmp_path / "m.lp"
     plain = Instance(ability=[1, 2], workload=[1])
-    with pytest.raises(InputError, match="makespan: is needed"):
+    with pytest.raises(InputError, match="makespan: is required"):
         write_model(plain, path, objective="makespan-energy")
-    with pytest.raises(InputError, match="makespan: is needed"):
+    with pytest.raises(InputError, match="makespan: is required"):
         write_model(Instance(ability=[1], workload=[1], speed=[1.0]), path)
     with pytest.raises(InputError, match="makespan: must be"):
         write_model(plain, path, makespan=0)

@@ -71,5 +71,5 @@ def test_without_optuna_the_extra_is_named(tmp_path: Path, monkeypatch: pytest.M
 def test_other_files_are_no_studies(tmp_path: Path) -> None:
     """A file that is no SQLite database is told in one line."""
     (tmp_path / "study.db").write_text("no database, and long enough to be seen as such" * 10)
-    with pytest.raises(InputError, match="is not a file of studies"):
+    with pytest.raises(InputError, match="is not a study"):
         open_study(tmp_path / "study.db", "ppo", 0)
