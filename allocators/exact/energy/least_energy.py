@@ -5,6 +5,7 @@ from contextlib import nullcontext
 
 from alloc.allocators.contract.search import Search
 from alloc.allocators.exact.energy.cuts.group_programme import GroupProgramme
+from alloc.allocators.exact.energy.neighbourhood import InducedSearch
 from alloc.allocators.exact.energy.places import nearest_places, without_idlers
 from alloc.allocators.exact.energy.primal_dual import FEW_GROUPS, REPEATABLE_SLICES, PrimalDual
 from alloc.allocators.exact.energy.state import STAGE_S, EnergyState
@@ -84,7 +85,7 @@ def _least_cost(state: EnergyState, solver: Solver) -> float:
         state.submit(None)
     if both is None:
         return _solve_rest(state, solver).bound
-    groups = _close_gap(state, both)
+    groups = _close_gap(state, both, solver)
     if state.travel is not None:
         state.travel.submit()
         state.submit(None)
@@ -101,7 +102,7 @@ def _least_cost(state: EnergyState, solver: Solver) -> float:
     return min(max(bound, both.bound), state.cost)
 
 
-def _close_gap(state: EnergyState, both: PrimalDual) -> GroupProgramme | None:
+def _close_gap(state: EnergyState, both: PrimalDual, solver: Solver) -> GroupProgramme | None:
     """Work on both sides until better plans have few groups, or bounds hardly rise any more; return these groups."""
     search = state.search
     if state.repeatable:
@@ -110,10 +111,13 @@ def _close_gap(state: EnergyState, both: PrimalDual) -> GroupProgramme | None:
                 return None
             state.submit(both.repeat(number))
         return None
-    next_try = LATER
+    next_try, induced = LATER, InducedSearch()
     with Pool(1) as pool:
         while not (is_over(search) or both.closed):
             progress = state.progress
+            if induced.is_due(state):
+                induced.turn(state, solver)
+                continue
             if progress >= next_try and state.travel is None:
                 next_try = progress + (LATER if _mix_groups(state, both) else MUCH_LATER)
                 continue

@@ -161,6 +161,15 @@ class PrimalDual:
         """Return groups found so far of which a better plan may consist, at most so many."""
         return None if self._cuts is None else self._cuts.known_groups(self._cost, most)
 
+    @property
+    def mixture(self) -> FloatArray | None:
+        """Agents of each pair of the demand in the cheapest mixture of groups so far; None before there is one."""
+        if self._cuts is None:
+            return None
+        mixed = np.zeros(len(self._demand.class_of_pair))
+        mixed[self._kept] = self._cuts.mixture
+        return mixed
+
     def groups_of_cheapest(self, most: int) -> GroupProgramme | None:
         """Return all groups of plans that cost less than the bound plus a share of the gap.
 

@@ -106,6 +106,11 @@ class CuttingPlanes:
         """The best prices of agents so far, shape (k,)."""
         return self._price
 
+    @property
+    def mixture(self) -> FloatArray:
+        """Agents of each pair that is kept in the cheapest mixture of the groups so far, shape (p,)."""
+        return self._master.mixture
+
     def ascend(self, rounds: int, cost: float) -> None:
         """Do so many rounds of pricing, given the cost of a plan at hand."""
         for _ in range(rounds):

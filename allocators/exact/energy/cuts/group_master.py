@@ -196,6 +196,14 @@ class GroupMaster:
         np.minimum.at(least, self._task[known], cost)
         return least
 
+    @property
+    def mixture(self) -> FloatArray:
+        """Agents of each pair in the last mixture, shape (p,)."""
+        known, model = slice(len(self._part)), self._model
+        mixed = np.zeros((self._tasks, len(model.count)))
+        np.add.at(mixed, self._task[known], self._part[:, None] * self._use[known, :-1])
+        return np.asarray(mixed[model.task_of_pair, model.class_of_pair])
+
     def fees(self, penalty: FloatArray) -> FloatArray:
         """Return the penalties of cluster cuts for an agent of each pair, shape (p,)."""
         model, fee = self._model, np.zeros((self._tasks, len(self._model.count)))

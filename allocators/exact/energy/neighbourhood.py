@@ -1,0 +1,106 @@
+"""The neighbourhood of a plan that a mixture of groups induces: agents on whom both agree stay where they are.
+
+References
+----------
+Danna, Rothberg and Le Pape (2005), Exploring relaxation induced neighborhoods to improve MIP solutions,
+doi:10.1007/s10107-004-0518-7.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from alloc.allocators.exact.energy.energy_model import Mask
+from alloc.allocators.exact.energy.state import STAGE_S, EnergyState
+from alloc.allocators.exact.monitor import SolverMonitor
+from alloc.allocators.exact.solver_model import Solver, SolverLimits, SolverModel
+from alloc.problems.instance import FloatArray, IntArray
+
+
+@dataclass(frozen=True)
+class Size:
+    """How large a neighbourhood is.
+
+    Attributes
+    ----------
+    agreed : float
+        Difference in agents up to which plan and mixture agree on a pair of class and task.
+    least : float
+        Agents of the mixture up to which a pair that the plan has not is left out.
+    """
+
+    agreed: float
+    least: float
+
+
+SIZES = Size(0.15, 0.1), Size(0.15, 0.05), Size(0.1, 0.02), Size(0.05, 0.02), Size(0.03, 0.01), Size(1e-3, 1e-3)
+"""From the smallest to the largest."""
+
+FIRST_SIZE = 2
+
+FIRST_TRY, PAUSE, SHARE = 0.1, 0.05, 0.05
+"""Parts of the stage's time before the first search of a neighbourhood, between a search and the next, and for one
+search at the most."""
+
+PROVEN_GAP = 1e-6
+"""Relative gap at which a neighbourhood counts as searched to the end."""
+
+
+def induced_pairs(agent_class: IntArray, plan: IntArray, mixed: FloatArray, size: Size) -> Mask:
+    """Return the pairs of class and task in the neighbourhood, shape (p,), those of the plan among them.
+
+    Parameters
+    ----------
+    agent_class : ndarray of int, shape (p,)
+    plan : ndarray of int, shape (p,)
+        Agents of each pair in the plan.
+    mixed : ndarray, shape (p,)
+        Agents of each pair in the mixture.
+    size : Size
+    """
+    has_agreed = np.bincount(agent_class, np.abs(plan - mixed) > size.agreed) == 0
+    return np.asarray((plan > 0) | ((mixed > size.least) & ~has_agreed[agent_class]))
+
+
+class InducedSearch:
+    """Searches neighbourhoods of the best plan with a solver, now and then.
+
+    A neighbourhood searched to the end without a better plan is followed by a larger one, one not searched to the end
+    by a smaller one, after twice as long a pause.
+    """
+
+    def __init__(self) -> None:
+        self._size, self._next_try, self._pause = FIRST_SIZE, FIRST_TRY, PAUSE
+
+    def is_due(self, state: EnergyState) -> bool:
+        """Whether enough time has passed since the last search."""
+        return state.travel is None and state.progress >= self._next_try
+
+    def turn(self, state: EnergyState, solver: Solver) -> None:
+        """Search the neighbourhood of the best plan, and submit what was found."""
+        search, before, seconds = state.search, state.cost, SHARE * min(STAGE_S, state.until_s - state.begin_s)
+        mixed = None if state.primal_dual is None else state.primal_dual.mixture
+        if mixed is not None:
+            assert search.best is not None
+            plan = state.model.counts(state.demand, search.best.allocation)
+            inside = induced_pairs(state.demand.class_of_pair, plan, mixed, SIZES[self._size])
+            demand = state.demand.only(np.flatnonzero(inside))
+            model = SolverModel(
+                demand=demand,
+                cost=state.model.cost[state.model.pairs_at(demand)],
+                hint=plan[inside],
+                limits=SolverLimits.of(search, seconds, 1),
+            )
+            until_s = min(state.until_s, search.elapsed_s + seconds)
+            answer = solver.solve_model(model, SolverMonitor(search, state.model, demand, until_s))
+            search.iteration += 1
+            if answer.counts is not None:
+                search.submit(state.model.allocation(demand, answer.counts))
+            state.submit(None)
+            if state.cost < before * (1 - PROVEN_GAP):
+                self._pause = PAUSE
+            elif answer.bound >= before * (1 - PROVEN_GAP):
+                self._size = min(self._size + 1, len(SIZES) - 1)
+            else:
+                self._size, self._pause = max(0, self._size - 1), 2 * self._pause
+        self._next_try = state.progress + self._pause
