@@ -8,7 +8,7 @@ from alloc.allocators.exact.energy.cuts.group_programme import GroupProgramme
 from alloc.allocators.exact.energy.neighbourhood import InducedSearch
 from alloc.allocators.exact.energy.places import nearest_places, without_idlers
 from alloc.allocators.exact.energy.primal_dual import FEW_GROUPS, REPEATABLE_SLICES, PrimalDual
-from alloc.allocators.exact.energy.state import STAGE_S, EnergyState
+from alloc.allocators.exact.energy.state import EnergyState
 from alloc.allocators.exact.model import Model
 from alloc.allocators.exact.monitor import SolverMonitor, is_over
 from alloc.allocators.exact.solver_model import Answer, Solver, SolverLimits, SolverModel
@@ -30,10 +30,6 @@ SOLVER_GAP = 1e-7
 
 SMALL_PAIRS = 3000
 """Number of pairs that a better plan may use, up to which the solver is called even if bounds still rise."""
-
-LATER, MUCH_LATER, MIXING_SHARE, MOST_MIXED = 0.12, 0.3, 0.04, 1500
-"""Parts of the time between two attempts to make a plan of groups found so far, after a better plan and else; part of
-the time that an attempt takes, and groups in it, at the most."""
 
 LOCAL_SHARE, LESS_SHARE, MAX_LOCAL_S = 0.7, 0.1, 30.0
 """Time share of local search if nothing else finds plans, and if the annealing search with prices does; and its maximum
@@ -111,15 +107,12 @@ def _close_gap(state: EnergyState, both: PrimalDual, solver: Solver) -> GroupPro
                 return None
             state.submit(both.repeat(number))
         return None
-    next_try, induced = LATER, InducedSearch()
+    induced = InducedSearch()
     with Pool(1) as pool:
         while not (is_over(search) or both.closed):
             progress = state.progress
             if induced.is_due(state):
                 induced.turn(state, solver)
-                continue
-            if progress >= next_try and state.travel is None:
-                next_try = progress + (LATER if _mix_groups(state, both) else MUCH_LATER)
                 continue
             is_ready = both.converged or (both.is_rising_slowly and len(both.keep) <= SMALL_PAIRS)
             groups = None if progress < SHARE_WITHOUT_GROUPS else both.few_groups()
@@ -128,22 +121,6 @@ def _close_gap(state: EnergyState, both: PrimalDual, solver: Solver) -> GroupPro
                 return groups
             state.submit(both.run(min(1.0, progress), pool if state.spare_threads else None))
     return None
-
-
-def _mix_groups(state: EnergyState, both: PrimalDual) -> bool:
-    """Look for a better plan among the groups that prices have brought up; return whether there was one."""
-    search, before = state.search, state.cost
-    groups = both.known_groups(MOST_MIXED)
-    if groups is None:
-        return False
-    monitor = SolverMonitor(search, state.model, state.demand, state.until_s)
-    seconds = MIXING_SHARE * min(STAGE_S, state.until_s - state.begin_s)
-    counts, _ = groups.solve(monitor, search.seed, repeatable=False, seconds=seconds)
-    search.iteration += 1
-    if counts is not None:
-        search.submit(both.allocation(groups, counts))
-        state.submit(None)
-    return state.cost < before * (1 - SOLVER_GAP)
 
 
 def _finds_plans(state: EnergyState, both: PrimalDual) -> bool:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from alloc.allocators.exact.energy.energy_model import Mask
-from alloc.allocators.exact.energy.state import STAGE_S, EnergyState
+from alloc.allocators.exact.energy.state import EnergyState
 from alloc.allocators.exact.monitor import SolverMonitor
 from alloc.allocators.exact.solver_model import Solver, SolverLimits, SolverModel
 from alloc.problems.instance import FloatArray, IntArray
@@ -39,8 +39,11 @@ SIZES = Size(0.15, 0.1), Size(0.15, 0.05), Size(0.1, 0.02), Size(0.05, 0.02), Si
 FIRST_SIZE = 2
 
 FIRST_TRY, PAUSE, SHARE = 0.1, 0.05, 0.05
-"""Parts of the stage's time before the first search of a neighbourhood, between a search and the next, and for one
-search at the most."""
+"""Parts of the stage's time before the first search of a neighbourhood, between one that found a better plan and the
+next, and for one search at the most."""
+
+SHORT_S = 0.8
+"""Length of the stage up to which there is no such search, as building the solver's model takes some of its time."""
 
 PROVEN_GAP = 1e-6
 """Relative gap at which a neighbourhood counts as searched to the end."""
@@ -66,7 +69,7 @@ class InducedSearch:
     """Searches neighbourhoods of the best plan with a solver, now and then.
 
     A neighbourhood searched to the end without a better plan is followed by a larger one, one not searched to the end
-    by a smaller one, after twice as long a pause.
+    by a smaller one; after either the pause is twice as long.
     """
 
     def __init__(self) -> None:
@@ -74,33 +77,42 @@ class InducedSearch:
 
     def is_due(self, state: EnergyState) -> bool:
         """Whether enough time has passed since the last search."""
-        return state.travel is None and state.progress >= self._next_try
+        return state.travel is None and state.stage_s > SHORT_S and state.progress >= self._next_try
 
     def turn(self, state: EnergyState, solver: Solver) -> None:
         """Search the neighbourhood of the best plan, and submit what was found."""
-        search, before, seconds = state.search, state.cost, SHARE * min(STAGE_S, state.until_s - state.begin_s)
         mixed = None if state.primal_dual is None else state.primal_dual.mixture
         if mixed is not None:
-            assert search.best is not None
-            plan = state.model.counts(state.demand, search.best.allocation)
-            inside = induced_pairs(state.demand.class_of_pair, plan, mixed, SIZES[self._size])
-            demand = state.demand.only(np.flatnonzero(inside))
-            model = SolverModel(
-                demand=demand,
-                cost=state.model.cost[state.model.pairs_at(demand)],
-                hint=plan[inside],
-                limits=SolverLimits.of(search, seconds, 1),
-            )
-            until_s = min(state.until_s, search.elapsed_s + seconds)
-            answer = solver.solve_model(model, SolverMonitor(search, state.model, demand, until_s))
-            search.iteration += 1
-            if answer.counts is not None:
-                search.submit(state.model.allocation(demand, answer.counts))
-            state.submit(None)
-            if state.cost < before * (1 - PROVEN_GAP):
-                self._pause = PAUSE
-            elif answer.bound >= before * (1 - PROVEN_GAP):
-                self._size = min(self._size + 1, len(SIZES) - 1)
-            else:
-                self._size, self._pause = max(0, self._size - 1), 2 * self._pause
+            known = state.cost
+            cost, least = _search_induced(state, solver, mixed, SIZES[self._size])
+            is_better, is_done = cost < known * (1 - PROVEN_GAP), least >= known * (1 - PROVEN_GAP)
+            self._pause = PAUSE if is_better else 2 * self._pause
+            if not is_better:
+                self._size = int(np.clip(self._size + (1 if is_done else -1), 0, len(SIZES) - 1))
         self._next_try = state.progress + self._pause
+
+
+def _search_induced(state: EnergyState, solver: Solver, mixed: FloatArray, size: Size) -> tuple[float, float]:
+    """Return the cost of the best plan that the solver finds in a neighbourhood, and what all plans there cost."""
+    search, both = state.search, state.primal_dual
+    assert search.best is not None
+    plan = state.model.counts(state.demand, search.best.allocation)
+    inside = induced_pairs(state.demand.class_of_pair, plan, mixed, size)
+    demand = state.demand.only(np.flatnonzero(inside))
+    cost = state.model.cost[state.model.pairs_at(demand)]
+    seconds = SHARE * state.stage_s
+    limits = SolverLimits.of(search, seconds, 1)
+    until_s = min(state.until_s, search.elapsed_s + seconds)
+
+    def meanwhile() -> bool:
+        if both is not None and state.spare_threads:
+            state.submit(both.run(min(1.0, state.progress), None))
+        return False
+
+    monitor = SolverMonitor(search, state.model, demand, until_s, meanwhile)
+    answer = solver.solve_model(SolverModel(demand, cost, plan[inside], limits), monitor)
+    search.iteration += 1
+    if answer.counts is not None:
+        search.submit(state.model.allocation(demand, answer.counts))
+    state.submit(None)
+    return np.inf if answer.counts is None else float(cost @ answer.counts), answer.bound

@@ -157,10 +157,6 @@ class PrimalDual:
         self._gap_tried = gap
         return self._cuts.all_groups(self._cost, FEW_GROUPS)
 
-    def known_groups(self, most: int) -> GroupProgramme | None:
-        """Return groups found so far of which a better plan may consist, at most so many."""
-        return None if self._cuts is None else self._cuts.known_groups(self._cost, most)
-
     @property
     def mixture(self) -> FloatArray | None:
         """Agents of each pair of the demand in the cheapest mixture of groups so far; None before there is one."""

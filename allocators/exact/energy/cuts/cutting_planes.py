@@ -142,14 +142,6 @@ class CuttingPlanes:
             return None
         return GroupProgramme(model, cost, task[can], groups[can], csr_array(used[can][:, on]), master.limit[on])
 
-    def known_groups(self, cost: float, most: int) -> GroupProgramme:
-        """Return those of the groups found so far that a plan that costs less than `cost` can have, at most so many."""
-        penalty = self._known_penalty
-        value, _, least = self._relax(self._price, penalty)
-        task, groups, used = self._master.cheap_groups(self._price, penalty, least, cost - value, most)
-        on = penalty > 0
-        return GroupProgramme(self._model, cost, task, groups, csr_array(used[:, on]), self._master.limit[on])
-
     @property
     def _known_penalty(self) -> FloatArray:
         """The best penalties so far, zero for the cuts since, shape (c,)."""

@@ -135,33 +135,6 @@ class GroupMaster:
         cost = self._paid(known, price, penalty)
         self._leave_out((cost - least[self._task[known]] > more) & (self._part <= 0))
 
-    def cheap_groups(
-        self, price: FloatArray, penalty: FloatArray, least: FloatArray, more: float, most: int
-    ) -> tuple[IntArray, csr_array, FloatArray]:
-        """Return groups known that cost at most by `more` above the least, the cheapest `most` of them at some prices.
-
-        Returns
-        -------
-        ndarray of int, shape (g,)
-            Their tasks.
-        csr_array, shape (g, p)
-            Agents of each pair.
-        ndarray, shape (g, c)
-            What they use of each cut.
-        """
-        known, model = slice(self._groups), self._model
-        cost = self._paid(known, price, penalty)
-        above = cost - least[self._task[known]]
-        cheap = np.argsort(above, kind="stable")[:most]
-        cheap = cheap[above[cheap] <= more]
-        pair = np.zeros((self._tasks, len(model.count)), dtype=np.intp)
-        pair[model.task_of_pair, model.class_of_pair] = np.arange(len(model.cost))
-        row, agent_class = np.nonzero(self._use[cheap, :-1])
-        agents = self._use[cheap][row, agent_class].astype(np.int64)
-        entries = agents, (row, pair[self._task[cheap][row], agent_class])
-        groups = csr_array(entries, shape=(len(cheap), len(model.cost)))
-        return self._task[cheap], groups, self._used[cheap, : len(self.limit)]
-
     def _paid(self, known: slice, price: FloatArray, penalty: FloatArray) -> FloatArray:
         """Return the costs of groups at prices of agents and penalties of the first cuts."""
         paid: FloatArray = self._cost[known] + self._use[known, :-1] @ price

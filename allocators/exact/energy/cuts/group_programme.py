@@ -57,9 +57,7 @@ class GroupProgramme:
     used: csr_array
     limit: FloatArray
 
-    def solve(
-        self, monitor: SolverMonitor, seed: int, *, repeatable: bool, seconds: float = np.inf
-    ) -> tuple[WholeArray | None, float]:
+    def solve(self, monitor: SolverMonitor, seed: int, *, repeatable: bool) -> tuple[WholeArray | None, float]:
         """Return agents of each pair in the best plan found, shape (p,), or None, and what all plans cost at least."""
         highs = highspy.Highs()
         highs.HandleUserInterrupt = True
@@ -68,7 +66,7 @@ class GroupProgramme:
             "output_flag": False, "parallel": "off", "random_seed": seed % 2**31, "mip_rel_gap": 1e-8,
             "mip_abs_gap": 0.0, "mip_feasibility_tolerance": TOLERANCE, "primal_feasibility_tolerance": TOLERANCE,
             "dual_feasibility_tolerance": TOLERANCE, "presolve_rule_off": PROBING,
-            "objective_bound": self.below * scale * (1 + TOLERANCE), "time_limit": seconds,
+            "objective_bound": self.below * scale * (1 + TOLERANCE),
         }  # fmt: skip
         if repeatable:
             options["mip_max_nodes"] = REPEATABLE_NODES

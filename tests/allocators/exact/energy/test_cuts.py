@@ -217,26 +217,24 @@ def test_dear_groups_are_left_out_until_they_are_added_again():
     assert master.solve(lambda: False)
     least, at = np.full(2, 2.0), (np.zeros(4), np.zeros(0))
     master.leave_out_dear(*at, least, 0.5)
-    task, kept, _ = master.cheap_groups(*at, least, 10.0, 100)
-    assert np.bincount(task).tolist() == [3, 3]
-    assert kept.toarray()[:, [3, 7]].max() == 0
+    kept = np.isfinite(master._cost[:8])
+    assert np.bincount(master._task[:8][kept]).tolist() == [3, 3]
+    assert master._use[:8][kept][:, 3].max() == 0
     assert master.add(groups[3])
     assert not master.add(groups[3])
-    assert len(master.cheap_groups(*at, least, 10.0, 100)[0]) == 8
+    assert np.isfinite(master._cost[:8]).all()
 
 
-def test_bound_with_cuts_is_the_least_cost_and_groups_found_have_its_plan():
+def test_bound_with_cuts_is_the_least_cost_and_the_mixture_a_plan():
     """Two agents for one task and the dear one for the other cost 5, mixtures 4.5."""
     model, groups = three_for_two()
     cuts = CuttingPlanes(model, np.zeros((0, 2), dtype=bool), np.zeros(4), groups)
     cuts.ascend(50, 5.5)
     assert cuts.bound == pytest.approx(5.0, abs=1e-3)
-    programme = cuts.known_groups(5.5, 100)
-    used, cost = model.by_class(programme.group).toarray(), programme.group @ model.cost
-    first, second = np.flatnonzero(programme.task == 0), np.flatnonzero(programme.task == 1)
-    plans = [cost[[f, s]].sum() for f in first for s in second if (used[f] + used[s] <= model.count).all()]
-    assert min(plans) == 5.0
-    assert len(cuts.known_groups(5.5, 1).task) == 1
+    mixed = cuts.mixture
+    assert mixed @ model.cost >= cuts.bound - 1e-3
+    assert (np.bincount(model.class_of_pair, mixed, 4) <= model.count + 1e-6).all()
+    assert (np.bincount(model.task_of_pair, mixed * model.weight, 2) >= model.need - 1e-6).all()
 
 
 def real_tasks(seed):

@@ -7,7 +7,7 @@ import pytest
 
 from alloc.allocators.contract.budget import Budget
 from alloc.allocators.contract.search import Search
-from alloc.allocators.exact.energy.neighbourhood import FIRST_SIZE, PAUSE, SIZES, InducedSearch, Size, induced_pairs
+from alloc.allocators.exact.energy.neighbourhood import PAUSE, SIZES, InducedSearch, Size, induced_pairs
 from alloc.allocators.exact.energy.state import EnergyState
 from alloc.allocators.exact.milp import HighsSolver
 from alloc.allocators.exact.model import Model
@@ -67,11 +67,13 @@ def test_the_best_plan_of_the_neighbourhood_is_found(mixture, cost):
     assert state.cost == pytest.approx(cost)
 
 
-def test_neighbourhoods_grow_when_they_are_searched_to_the_end():
-    """And are sought less often only where they are not."""
+def test_neighbourhoods_grow_and_are_searched_less_often_without_a_better_plan():
+    """A better plan makes pauses short again."""
     state, induced = with_mixture(crossed(), np.eye(2)[[0, 1, 0, 1]]), InducedSearch()
     assert not induced.is_due(state)
     for _ in range(2 * len(SIZES)):
         induced.turn(state, HighsSolver())
-    assert (induced._size, induced._pause) == (len(SIZES) - 1, PAUSE)
-    assert len(SIZES) - 1 > FIRST_SIZE
+    assert induced._size == len(SIZES) - 1
+    assert induced._pause == PAUSE * 2 ** (2 * len(SIZES))
+    induced.turn(with_mixture(state, np.full((4, 2), 0.5)), HighsSolver())
+    assert induced._pause == PAUSE
