@@ -99,7 +99,7 @@ def _least_cost(state: EnergyState, solver: Solver) -> float:
 
 
 def _close_gap(state: EnergyState, both: PrimalDual, solver: Solver) -> GroupProgramme | None:
-    """Work on both sides until better plans have few groups, or bounds hardly rise any more; return these groups."""
+    """Improve plans and bounds until better plans have few groups, or bounds hardly rise; return the groups if few."""
     search = state.search
     if state.repeatable:
         for number in range(REPEATABLE_SLICES):

@@ -1,4 +1,4 @@
-"""The neighbourhood of a plan that a mixture of groups induces: agents on whom both agree stay where they are.
+"""Relaxation induced neighbourhood search: agents on whom a plan and a mixture of groups agree are fixed.
 
 References
 ----------
@@ -19,14 +19,14 @@ from alloc.problems.instance import FloatArray, IntArray
 
 @dataclass(frozen=True)
 class Size:
-    """How large a neighbourhood is.
+    """Size of a neighbourhood.
 
     Attributes
     ----------
     agreed : float
-        Difference in agents up to which plan and mixture agree on a pair of class and task.
+        Difference in agents up to which plan and mixture agree on a pair of class and task, which is then fixed.
     least : float
-        Agents of the mixture up to which a pair that the plan has not is left out.
+        Agents of the mixture up to which a pair that the plan does not use is left out.
     """
 
     agreed: float
@@ -34,19 +34,19 @@ class Size:
 
 
 SIZES = Size(0.15, 0.1), Size(0.15, 0.05), Size(0.1, 0.02), Size(0.05, 0.02), Size(0.03, 0.01), Size(1e-3, 1e-3)
-"""From the smallest to the largest."""
+"""Sizes of neighbourhoods in ascending order."""
 
 FIRST_SIZE = 2
 
 FIRST_TRY, PAUSE, SHARE = 0.1, 0.05, 0.05
-"""Parts of the stage's time before the first search of a neighbourhood, between one that found a better plan and the
-next, and for one search at the most."""
+"""Shares of the stage's time before the first search of a neighbourhood, between a successful search and the next one,
+and for one search at most."""
 
 SHORT_S = 0.8
-"""Length of the stage up to which there is no such search, as building the solver's model takes some of its time."""
+"""Length of the stage up to which no neighbourhood is searched, as building the solver's model takes time."""
 
 PROVEN_GAP = 1e-6
-"""Relative gap at which a neighbourhood counts as searched to the end."""
+"""Relative gap at which the search of a neighbourhood counts as complete."""
 
 
 def induced_pairs(agent_class: IntArray, plan: IntArray, mixed: FloatArray, size: Size) -> Mask:
@@ -66,10 +66,10 @@ def induced_pairs(agent_class: IntArray, plan: IntArray, mixed: FloatArray, size
 
 
 class InducedSearch:
-    """Searches neighbourhoods of the best plan with a solver, now and then.
+    """Occasionally searches neighbourhoods of the best plan by a solver.
 
-    A neighbourhood searched to the end without a better plan is followed by a larger one, one not searched to the end
-    by a smaller one; after either the pause is twice as long.
+    After a complete search without a better plan the next neighbourhood is larger, after an incomplete one smaller; in
+    both cases the pause is doubled.
     """
 
     def __init__(self) -> None:
@@ -80,7 +80,7 @@ class InducedSearch:
         return state.travel is None and state.stage_s > SHORT_S and state.progress >= self._next_try
 
     def turn(self, state: EnergyState, solver: Solver) -> None:
-        """Search the neighbourhood of the best plan, and submit what was found."""
+        """Search the neighbourhood of the best plan, and submit a better plan."""
         mixed = None if state.primal_dual is None else state.primal_dual.mixture
         if mixed is not None:
             known = state.cost
@@ -93,7 +93,7 @@ class InducedSearch:
 
 
 def _search_induced(state: EnergyState, solver: Solver, mixed: FloatArray, size: Size) -> tuple[float, float]:
-    """Return the cost of the best plan that the solver finds in a neighbourhood, and what all plans there cost."""
+    """Return the cost of the best plan that the solver finds in a neighbourhood, and a lower bound there."""
     search, both = state.search, state.primal_dual
     assert search.best is not None
     plan = state.model.counts(state.demand, search.best.allocation)

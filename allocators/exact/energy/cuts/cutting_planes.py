@@ -1,9 +1,9 @@
-"""A lower bound on the least energy by mixtures of groups with cuts: column generation from Lagrangian prices.
+"""A lower bound on the least energy by column generation and cutting planes, starting from Lagrangian prices.
 
-The mixtures of groups for each task, of which the Lagrangian relaxation gives the least cost in the end, are a linear
-programme. Column generation solves it in few rounds from prices that are nearly the best, and then shows which
-mixtures there are: cuts over sets of classes rule some out. At any prices and penalties the cheapest groups, less what
-the agents and cuts cost, bound the cost of every plan from below.
+The Lagrangian relaxation is equivalent to a linear programme over mixtures (convex combinations) of groups for each
+task. From nearly optimal prices, column generation solves it in few rounds and yields the mixtures, of which cuts
+exclude some. At any prices and penalties, the cost of the cheapest groups less the value of agents and cuts is a lower
+bound on the cost of every plan.
 
 References
 ----------
@@ -27,29 +27,29 @@ from alloc.allocators.exact.knapsack import WholeArray
 from alloc.problems.instance import FloatArray
 
 SMOOTHING = 0.7
-"""Part of the best prices so far in those that are tried next."""
+"""Weight of the best prices so far in the next trial prices (stabilisation)."""
 
 PRECISION, EARLY = 1e-5, 0.05
-"""Relative difference between bound and programme at which prices are the best, and the part of the gap to the plan at
+"""Relative difference between bound and programme at which prices count as optimal; share of the gap to the plan at
 which cuts are added before that."""
 
 MOST_LOST = 0.1
-"""Part of the gap to the plan that searches for groups may lose by ending early; beyond that cuts over classes, which
-make them long, are left out."""
+"""Share of the gap to the plan that truncated searches for groups may cost; beyond it, cuts over classes, which slow
+down these searches, are removed."""
 
 MORE = 8
-"""Times as many groups are written out as wanted, as prices met before rule out many of them."""
+"""Factor on the number of enumerated groups, as earlier prices exclude many of them."""
 
 MOST_KEPT = 0.95
-"""Part of the pairs that are left at the most where some are dropped."""
+"""Pairs are dropped only if at most this share of them is kept."""
 
 MAX_PAIRS, MAX_CLASSES, MAX_CELLS, MAX_USES = 30_000, 1000, 20_000_000, 200_000
-"""Pairs of class and task, classes, cells of all tables of a round, and tasks times classes, above which all this takes
-too long or too much memory."""
+"""Numbers of pairs of class and task, classes, table cells of a round, and tasks times classes, above which the method
+takes too long or too much memory."""
 
 
 def is_small(model: EnergyModel) -> bool:
-    """Whether rounds are so short that there may be many."""
+    """Whether the model is small enough for many rounds."""
     classes, tasks = len(model.count), len(model.need)
     if len(model.copies) > MAX_PAIRS or classes > MAX_CLASSES or classes * tasks > MAX_USES:
         return False
@@ -58,7 +58,7 @@ def is_small(model: EnergyModel) -> bool:
 
 
 class CuttingPlanes:
-    """An ascent by column generation and cuts; ``bound`` is proven all the while.
+    """An ascent by column generation and cuts; ``bound`` is proven at any time.
 
     Parameters
     ----------
@@ -66,20 +66,20 @@ class CuttingPlanes:
     member : ndarray of bool, shape (f, t)
         Clusters of tasks.
     price : ndarray, shape (k,)
-        To begin with.
+        Initial prices.
     groups : list of ndarray of int, shape (p,)
-        Groups of all tasks to begin with, by pairs, those of a plan among them.
+        Initial groups of all tasks, by pairs, including those of a plan.
     should_stop : callable
-        Asked while cuts are sought, groups counted and programmes solved.
+        Called while cuts are separated, groups enumerated and programmes solved.
 
     Attributes
     ----------
     bound : float
-        No plan costs less.
+        Lower bound on the cost of all plans.
     kept : ndarray of bool, shape (p,)
-        Pairs that have not been dropped, as no better plan has them.
+        Pairs that have not been dropped; no better plan uses a dropped one.
     least_with : ndarray, shape (p,)
-        What plans with an agent of each pair that is kept cost at least, as of when pairs were last looked at.
+        Lower bound on plans with an agent of each kept pair, as of the last check of pairs.
     converged : bool
         Whether the mixture violates no cut, or the programme could not be solved.
     """
@@ -108,26 +108,25 @@ class CuttingPlanes:
 
     @property
     def mixture(self) -> FloatArray:
-        """Agents of each pair that is kept in the cheapest mixture of the groups so far, shape (p,)."""
+        """Agents of each kept pair in the cheapest mixture of the groups so far, shape (p,)."""
         return self._master.mixture
 
     def ascend(self, rounds: int, cost: float) -> None:
-        """Do so many rounds of pricing, given the cost of a plan at hand."""
+        """Run `rounds` rounds of pricing, given the cost of the incumbent plan."""
         for _ in range(rounds):
             if self.converged or self.bound >= cost * (1 - 1e-12):
                 return
             self._round(cost)
 
     def note_plan(self, plan: WholeArray) -> None:
-        """Take note of a better plan, by its agents of each pair that there was to begin with."""
+        """Record a better plan, given by its agents of each initial pair."""
         if not plan[~self.kept].any() and self._master.add(plan[self.kept]):
             self.converged = False
 
     def all_groups(self, cost: float, most: int) -> GroupProgramme | None:
-        """Return all groups of which plans that cost less than `cost` consist; None if they are more than `most`.
+        """Return all groups of plans that cost less than `cost`; None if more than `most`, or if stopped.
 
-        None as well if the run should stop meanwhile. What the group of a task costs more than its cheapest one is at
-        most what `cost` exceeds the bound by.
+        In such plans, the extra cost of a group over the cheapest one of its task is at most `cost` minus the bound.
         """
         model, master, penalty = self._model, self._master, self._known_penalty
         value, _, least = self._relax(self._price, penalty)
@@ -144,7 +143,7 @@ class CuttingPlanes:
 
     @property
     def _known_penalty(self) -> FloatArray:
-        """The best penalties so far, zero for the cuts since, shape (c,)."""
+        """The best penalties so far, zero for newer cuts, shape (c,)."""
         return np.append(self._penalty, np.zeros(len(self._master.limit) - len(self._penalty)))
 
     def _round(self, cost: float) -> None:
@@ -173,7 +172,7 @@ class CuttingPlanes:
         self._smoothing = SMOOTHING if is_new else (self._smoothing / 2 if self._smoothing > 0.2 else 0.0)
 
     def _lost(self, group: WholeArray, least: FloatArray, price: FloatArray, penalty: FloatArray) -> float:
-        """Return how much lower the bound is as searches for groups ended early, which cuts over classes make long."""
+        """Return the loss in the bound by truncated searches for groups, which cuts over classes make long."""
         master = self._master
         if not (master.seeks_sets and penalty.any()):
             return 0.0
@@ -181,10 +180,10 @@ class CuttingPlanes:
         return float((master.cheapest(price, penalty) - least)[nothing].sum())
 
     def _drop_pairs(self, cost: float) -> bool:
-        """Drop the pairs that no plan that costs less has, if they are many; return whether they are.
+        """Drop the pairs that no cheaper plan uses, if they are many; return whether any were dropped.
 
-        With an agent of a pair, its task costs at least as much as its best group with the agent does without the
-        penalties of cuts over classes, and the other tasks cost what they do in the bound.
+        With an agent of a pair, the cost of its task is at least that of its best group with the agent, without
+        penalties of cuts over classes; the costs of other tasks are those in the bound.
         """
         model = self._model
         penalty = self._known_penalty
@@ -195,7 +194,7 @@ class CuttingPlanes:
         group, excess, total = solve_subproblems(model, paid)
         unpenalised = np.bincount(model.task_of_pair, group * paid, len(least))
         if not np.isfinite(total) or abs(total - unpenalised.sum()) > 1e-9 * np.abs(unpenalised).sum():
-            return False  # a search for a group ended early
+            return False  # a search for a group was truncated
         more = excess + (unpenalised - least)[model.task_of_pair]
         self.least_with, stay = value + more, value + more <= cost * (1 + 1e-9)
         if stay.mean() > MOST_KEPT:
@@ -208,11 +207,11 @@ class CuttingPlanes:
         return True
 
     def _paid(self, price: FloatArray, penalty: FloatArray) -> FloatArray:
-        """Return what an agent of each pair costs with its price and the cuts of clusters, shape (p,)."""
+        """Return the cost of an agent of each pair including its price and the cuts of clusters, shape (p,)."""
         return np.asarray(self._model.cost + price[self._model.class_of_pair] + self._master.fees(penalty))
 
     def _relax(self, price: FloatArray, penalty: FloatArray) -> tuple[float, WholeArray, FloatArray]:
-        """Return the Lagrangian bound at some prices, groups that are cheaper there than those known, and all costs."""
+        """Return the Lagrangian bound at some prices, groups that are cheaper than known ones, and the least costs."""
         model, master = self._model, self._master
         whole, paid = model.is_whole, self._paid(price, penalty)
         if penalty.any() or whole:

@@ -1,4 +1,4 @@
-"""The integer programme that picks one group for each task, of all that a better plan may have; by HiGHS.
+"""The integer programme that selects one group for each task among those that a better plan may use; by HiGHS.
 
 References
 ----------
@@ -18,36 +18,36 @@ from alloc.allocators.exact.monitor import SolverMonitor
 from alloc.problems.instance import FloatArray
 
 TOLERANCE = 1e-9
-"""How far HiGHS may be off a row or an integer."""
+"""Feasibility and integrality tolerance of HiGHS."""
 
 PROBING = 2**15
-"""Rule of presolving that HiGHS is to leave out: on a thousand groups or more it takes all the time."""
+"""Presolve rule that HiGHS is to skip: for a thousand groups or more it takes all the time."""
 
 REPEATABLE_NODES = 5_000
-"""Limit in nodes of the search tree where runs must be repeatable."""
+"""Limit of repeatable runs in nodes of the search tree."""
 
 
 NOTHING_BELOW = (highspy.HighsModelStatus.kInfeasible, highspy.HighsModelStatus.kObjectiveBound)
-"""What HiGHS says where no plan costs less than the bound on the objective."""
+"""Statuses of HiGHS if no plan costs less than the bound on the objective."""
 
 
 @dataclass(frozen=True, eq=False)
 class GroupProgramme:
-    """Groups of which every plan that costs less than some cost consists, or some of them.
+    """All groups of plans that cost less than `below`, or some of them.
 
     Attributes
     ----------
     model : EnergyModel
     below : float
-        That cost.
+        Upper bound on the cost of plans of interest.
     task : ndarray of int, shape (g,)
         Task of each group.
     group : csr_array of int, shape (g, p)
         Agents of each pair in each group.
     used : csr_array, shape (g, c)
-        What each group uses of cuts that all plans satisfy.
+        Coefficients of each group in cuts that all plans satisfy.
     limit : ndarray, shape (c,)
-        Of these cuts.
+        Right-hand sides of these cuts.
     """
 
     model: EnergyModel
@@ -58,7 +58,7 @@ class GroupProgramme:
     limit: FloatArray
 
     def solve(self, monitor: SolverMonitor, seed: int, *, repeatable: bool) -> tuple[WholeArray | None, float]:
-        """Return agents of each pair in the best plan found, shape (p,), or None, and what all plans cost at least."""
+        """Return the best plan found as agents of each pair, shape (p,), or None, and a lower bound on all plans."""
         highs = highspy.Highs()
         highs.HandleUserInterrupt = True
         scale = 1 / max(1e-300, float(np.abs(self.model.cost).mean()))
@@ -88,7 +88,7 @@ class GroupProgramme:
         return monitor.run(work, highs.cancelSolve) or (None, 0.0)
 
     def _compile(self, scale: float) -> highspy.HighsLp:
-        """Return the programme for HiGHS: a row for each task, then for each class, then for each cut."""
+        """Return the programme for HiGHS, with a row for each task, then each class, then each cut."""
         model, groups, tasks = self.model, len(self.task), len(self.model.need)
         columns = np.arange(groups)
         of_task = csr_array((np.ones(groups), (self.task, columns)), shape=(tasks, groups))

@@ -41,7 +41,7 @@ class DrawnTask:
 @pytest.mark.parametrize("kind", ["whole", "limited", "real"])
 @pytest.mark.parametrize("seed", range(12))
 def test_cheapest_group_with_cuts_is_that_of_all_groups_written_out(seed, kind):
-    """With classes of up to two agents and random cuts, no group is cheaper, and the one found costs what it says."""
+    """With classes of up to two agents and random cuts, no group is cheaper, and the reported cost is right."""
     task = DrawnTask(seed, kind)
     group = np.zeros(7, dtype=np.int64)
     least = price_groups(
@@ -54,8 +54,8 @@ def test_cheapest_group_with_cuts_is_that_of_all_groups_written_out(seed, kind):
 
 @pytest.mark.parametrize("kind", ["whole", "limited", "real"])
 @pytest.mark.parametrize("seed", range(12))
-def test_groups_within_a_limit_are_those_of_all_written_out(seed, kind):
-    """No group is missing, but for those that can do without an agent where sums of weights have no limit."""
+def test_enumeration_finds_all_groups_within_a_limit(seed, kind):
+    """No group is missing, except non-minimal ones if sums of weights are unlimited."""
     task = DrawnTask(seed, kind)
     least = np.where(task.groups > 0, task.weight, np.inf).min(axis=1)
     wanted = (kind == "limited") | (task.done - least < task.need)
@@ -72,7 +72,7 @@ def test_groups_within_a_limit_are_those_of_all_written_out(seed, kind):
 
 
 def test_a_cut_closes_the_gap_of_three_agents_for_two_tasks():
-    """Any two of three agents do a task: halves of them would do for both, whole ones for one alone."""
+    """If any two of three agents suffice for a task, fractional agents suffice for both tasks, integer ones for one."""
     use = np.array([[1, 0, 1], [1, 1, 0], [0, 1, 1], [0, 0, 0]])
     sets, excess = violated_sets(use, np.array([0.5, 0.5, 0.5]), np.array([1, 1, 1, 0]), 0.05, 10)
     assert sets.tolist() == [[0, 1, 2]]
@@ -81,8 +81,8 @@ def test_a_cut_closes_the_gap_of_three_agents_for_two_tasks():
 
 @pytest.mark.parametrize("limited", [False, True])
 @pytest.mark.parametrize("seed", range(3))
-def test_a_cut_of_a_cluster_holds_for_all_solutions_and_not_for_the_mixture(seed, limited):
-    """Agents of 5 and 10 for two tasks of 13 in all give 15, or more: parts of agents that give 13 break the cut."""
+def test_a_cluster_cut_is_valid_and_violated_by_the_mixture(seed, limited):
+    """Agents of 5 and 10 for two tasks of 13 in total give at least 15: fractional agents that give 13 violate it."""
     ability = np.append([5, 10], 5 * np.random.default_rng(seed).integers(1, 2, 4, endpoint=True))
     need = np.array([7, 6])
     model = EnergyModel(
@@ -100,7 +100,7 @@ def test_a_cut_of_a_cluster_holds_for_all_solutions_and_not_for_the_mixture(seed
 
 
 def plain_model(tasks: int, classes: int) -> EnergyModel:
-    """Return a model in which any three agents, each of a class of its own, do a task."""
+    """Return a model in which any three agents, each a class of its own, suffice for a task."""
     pairs = tasks * classes
     return EnergyModel(
         class_of_pair=np.tile(np.arange(classes), tasks), task_of_pair=np.repeat(np.arange(tasks), classes),
@@ -110,8 +110,8 @@ def plain_model(tasks: int, classes: int) -> EnergyModel:
     )  # fmt: skip
 
 
-def test_groups_and_cuts_end_where_memory_does(monkeypatch):
-    """Tables of groups grow up to their limit and no further; the programme goes on with the groups that it has."""
+def test_groups_and_cuts_are_limited_by_memory(monkeypatch):
+    """Tables of groups grow up to their limit; the programme continues with the groups that it has."""
     monkeypatch.setattr(group_master, "MOST_ENTRIES", 2 * group_master.ROOM * group_master.ROOM_FOR_CUTS)
     master = group_master.GroupMaster(plain_model(1, 30), np.ones((1, 1), dtype=bool))
     added = 0
@@ -127,7 +127,7 @@ def test_groups_and_cuts_end_where_memory_does(monkeypatch):
 
 
 def test_tasks_that_share_agents_become_clusters():
-    """Tasks 0, 1 and 2 share agents in a chain, task 3 has whole ones."""
+    """Tasks 0 and 1, and 1 and 2, share agents; task 3 has integer ones."""
     mixed = np.array([[0.5, 0.0, 1.0], [0.5, 0.4, 0.0], [0.0, 0.6, 0.0], [0.0, 0.0, 2.0]])
     clusters = {tuple(np.flatnonzero(inside)) for inside in sharing_clusters(mixed, 8)}
     assert {(0, 1), (1, 2), (0, 1, 2)} <= clusters
@@ -147,8 +147,8 @@ def knapsack_of(rng: np.random.Generator, limited: bool) -> EnergyModel:
 
 @pytest.mark.parametrize("limited", [False, True])
 @pytest.mark.parametrize("seed", range(15))
-def test_a_cluster_is_cut_where_its_mixture_is_none_of_whole_solutions(seed, limited):
-    """A linear programme over all solutions written out says by how much a cut can be violated at the most."""
+def test_a_cluster_is_cut_unless_its_mixture_is_one_of_integer_solutions(seed, limited):
+    """A linear programme over all enumerated solutions gives the largest violation of a cut."""
     rng = np.random.default_rng(seed)
     model, both = knapsack_of(rng, limited), np.ones((1, 2), dtype=bool)
     knapsack = ClusterSeparation(model, both)._knapsack(both[0])
@@ -168,8 +168,8 @@ def test_a_cluster_is_cut_where_its_mixture_is_none_of_whole_solutions(seed, lim
         assert (every @ cut.factor <= cut.limit).all()
 
 
-def test_groups_that_cost_too_much_at_prices_met_before_are_in_no_better_plan():
-    """Of three groups, one costs too much by its agents, one by the penalty of its set of classes."""
+def test_groups_too_expensive_at_earlier_prices_are_excluded():
+    """Of three groups, one is too expensive by its agents, one by the penalty of its set of classes."""
     model, prices = plain_model(1, 4), KnownPrices()
     prices.note(model, np.array([0.1, 0.1, 0.1, 0.9]), np.array([0.8]), 2.0, np.array([0.3]))
     group = csr_array(np.array([[1, 1, 1, 0], [1, 1, 0, 1], [0, 1, 1, 1]]))
@@ -180,7 +180,7 @@ def test_groups_that_cost_too_much_at_prices_met_before_are_in_no_better_plan():
 
 
 def three_for_two() -> tuple[EnergyModel, list[np.ndarray]]:
-    """Any two of three agents do either of two tasks, or one dear agent alone; and the groups of both tasks."""
+    """Any two of three agents, or an expensive one alone, do either of two tasks; return the groups of both as well."""
     model = EnergyModel(
         class_of_pair=np.tile(np.arange(4), 2), task_of_pair=np.repeat([0, 1], 4), weight=np.tile([1, 1, 1, 2], 2),
         copies=np.ones(8, dtype=np.int64), cost=np.tile([1.0, 1.0, 1.0, 3.0], 2), need=np.array([2, 2]),
@@ -190,8 +190,8 @@ def three_for_two() -> tuple[EnergyModel, list[np.ndarray]]:
     return model, [np.tile(group, 2) for group in ([1, 1, 0, 0], [1, 0, 1, 0], [0, 1, 1, 0], [0, 0, 0, 1])]
 
 
-def test_cuts_over_classes_can_be_left_out_again():
-    """They raise the value of the mixture, and without them it is what it was; none is sought after that."""
+def test_cuts_over_classes_can_be_removed_again():
+    """They raise the value of the mixture; after their removal it is as before, and no new ones are separated."""
     model, groups = three_for_two()
     master = group_master.GroupMaster(model, np.zeros((0, 2), dtype=bool))
     for group in groups:
@@ -207,8 +207,8 @@ def test_cuts_over_classes_can_be_left_out_again():
     assert not master.separate(lambda: False)
 
 
-def test_dear_groups_are_left_out_until_they_are_added_again():
-    """At prices of zero, a dear agent costs 1 above the least; it is not in use where there are two of each other."""
+def test_expensive_groups_are_left_out_until_they_are_added_again():
+    """At prices of zero, an expensive agent costs 1 above the least; with two of each other agent it is not used."""
     model, groups = three_for_two()
     model = replace(model, count=np.array([2, 2, 2, 4]))
     master = group_master.GroupMaster(model, np.zeros((0, 2), dtype=bool))
@@ -226,7 +226,7 @@ def test_dear_groups_are_left_out_until_they_are_added_again():
 
 
 def test_bound_with_cuts_is_the_least_cost_and_the_mixture_a_plan():
-    """Two agents for one task and the dear one for the other cost 5, mixtures 4.5."""
+    """Two agents for one task and the expensive one for the other cost 5, mixtures 4.5."""
     model, groups = three_for_two()
     cuts = CuttingPlanes(model, np.zeros((0, 2), dtype=bool), np.zeros(4), groups)
     cuts.ascend(50, 5.5)
