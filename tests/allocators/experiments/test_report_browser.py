@@ -149,7 +149,7 @@ def test_a_page_of_little_says_so(tmp_path):
     (tmp_path / "none.db").write_bytes(b"")
     report_html([tmp_path / "none.db"], tmp_path / "none.html")
     found = run_in_browser(tmp_path / "none.html", LOADED, tmp_path, flags=[PATIENT])
-    assert found["problem"].startswith("There are no runs")
+    assert found["problem"].startswith("There are no completed runs")
     fill(tmp_path / "runs.db", methods=["hedonic"])
     report_html([tmp_path / "runs.db"], tmp_path / "page.html")
     found = run_in_browser(tmp_path / "page.html", LOADED, tmp_path, flags=[PATIENT])

@@ -45,7 +45,7 @@ def crowd(rng: np.random.Generator) -> Mission:
 
 def told(planner: MissionPlanner, rng: np.random.Generator, step: int) -> dict[str, object]:
     """Return a random event."""
-    agents, tasks = list(planner._picture.state.agents), list(planner._picture.state.tasks)
+    agents, tasks = list(planner._picture.state.all_agents), list(planner._picture.state.all_tasks)
     agent, task = rng.choice(agents).facts.id, rng.choice(tasks).facts.id
     return [
         {"event": "agent-recalled", "agent": agent},
