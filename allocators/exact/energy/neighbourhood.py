@@ -37,6 +37,7 @@ SIZES = Size(0.15, 0.1), Size(0.15, 0.05), Size(0.1, 0.02), Size(0.05, 0.02), Si
 """Sizes of neighbourhoods in ascending order."""
 
 FIRST_SIZE = 2
+"""Index of the size of the first neighbourhood."""
 
 FIRST_TRY, PAUSE, SHARE = 0.1, 0.05, 0.05
 """Shares of the stage's time before the first search of a neighbourhood, between a successful search and the next one,

@@ -114,19 +114,19 @@ def insert_by_deadline(
     balance: float,
     meets_at_once: bool,
 ) -> None:
-    """Put tasks where one agent can do them in time, those first that are due first; then seek coalitions for others.
+    """Insert tasks that one agent can do in time, in order of their deadlines; then seek coalitions for the others.
 
     Parameters
     ----------
     waiting : ndarray of int, shape (k,)
         The tasks.
     size : float
-        By how many times the hours that one agent needs for it a task comes later, as large ones take the time of
-        several small ones.
+        Multiple of the hours of work for one agent that is added to the deadline of a task, so that large tasks, which
+        take the time of several small ones, come later.
     balance : float
         As for `insert_best`.
     meets_at_once : bool
-        Whether a coalition is sought before tasks are put in that are due later: for plenty of agents.
+        Whether a coalition is sought before later tasks are inserted, which suits many agents.
     """
     ability, weight = np.mean(s.agents["ability"]) * s.pace, 1.0 / len(s.tasks)
     key = np.empty(len(waiting))

@@ -26,8 +26,7 @@ BALANCE = 0.1
 """Weight of the end of a route, relative to the time a task takes from it, where tasks are inserted by deadline."""
 
 SIZES = (0.0, 0.0, 6.0, 12.0)
-"""Where tasks are inserted by deadline, so many times the hours that one agent needs are added to it; with the
-first of these, coalitions are sought at once."""
+"""Values of `size` that `insert_by_deadline` tries; with the first one, coalitions are sought at once."""
 
 WAYS = len(SIZES) + 1
 """Number of ways to insert tasks, of which the last is by least cost per weight."""
@@ -184,7 +183,7 @@ def _put_in(
     fresh: Bools,
     ways: tuple[int, int],
 ) -> None:
-    """Put tasks into a plan in the way, of these, that is best; the second schedule stays that of the plan before."""
+    """Insert tasks into a plan in the best of several ways; the second schedule remains that of the plan before."""
     r, trial_r = pair
     routes, lengths = plan
     best, kept, kept_lengths = np.inf, routes.copy(), lengths.copy()
