@@ -104,7 +104,7 @@ DOORS = [
 @pytest.mark.parametrize(
     ("door", "name", "value"), [(door, name, value) for door, name, values in DOORS for value in values]
 )
-def test_wrong_arguments_are_named(door, name, value):
+def test_wrong_arguments_are_errors_that_name_them(door, name, value):
     """Each wrong value of each parameter is an `InputError` that names the parameter, or its row in the data."""
     if name == "instance" and door is solve:
         door = partial(solve, method="greedy")
@@ -120,7 +120,7 @@ def test_wrong_arguments_are_named(door, name, value):
     ), str(caught.value)
 
 
-def test_other_types_that_mean_the_same_are_taken(tmp_path):
+def test_equivalent_types_are_accepted(tmp_path):
     """numpy's numbers, a dict of ids and a result as start, missing values as pandas has them: all as plain ones."""
     plain = run(seed=3, iterations=5, objective="makespan")
     other = run(seed=np.int64(3), iterations=np.int32(5), objective=np.str_("makespan"), threads=np.int8(1))
@@ -137,7 +137,7 @@ def test_other_types_that_mean_the_same_are_taken(tmp_path):
 
 
 @pytest.mark.parametrize("copied", [deepcopy, lambda value: pickle.loads(pickle.dumps(value))])
-def test_copies_are_read_only_too(copied):
+def test_copies_are_read_only(copied):
     """What was pickled or copied can be written to no more than what it was made from."""
     instance = copied(make(allowed_tasks=[[0], None, [1, 2]]))
     allocation = copied(Allocation([0, 1, 2]))
@@ -145,7 +145,7 @@ def test_copies_are_read_only_too(copied):
     assert not any(array.flags.writeable for array in (*arrays, copied(evaluate(SMALL, allocation)).coverage))
 
 
-def test_one_family_of_errors():
+def test_all_errors_share_a_base_class():
     """One base catches all that is raised on purpose; the built-in kinds of today still do."""
     for error, kind in (
         (InputError, ValueError),

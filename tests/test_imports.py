@@ -9,14 +9,14 @@ HEAVY = ("torch", "cvxpy", "ortools", "deap", "matplotlib", "highspy", "ray", "n
 
 
 @pytest.mark.parametrize("package", ["alloc.problems", "alloc.problems.generate", "alloc.allocators"])
-def test_light(package: str) -> None:
+def test_import_loads_no_heavy_packages(package: str) -> None:
     """Neither the problem nor the contract of allocators loads a solver, a learner or a plotter."""
     code = f"import sys, {package}; print(*(name for name in {HEAVY} if name in sys.modules))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == ""
 
 
-def test_problems_know_nothing_of_allocators() -> None:
+def test_problems_do_not_import_allocators() -> None:
     """Dependencies point one way."""
     code = "import sys, alloc.problems; print(*(name for name in sys.modules if name.startswith('alloc.allocators')))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

@@ -7,7 +7,7 @@ from alloc.problems import Allocation, Instance, evaluate
 
 
 @pytest.mark.parametrize("seed", range(30))
-def test_the_evaluator_agrees_with_the_oracle(seed):
+def test_evaluator_agrees_with_the_oracle(seed):
     """The optimum found by brute force scores the same by `evaluate`, which shares no code with it."""
     instance = tiny_instance(seed)
     best = brute_force(instance)
@@ -19,7 +19,7 @@ def test_the_evaluator_agrees_with_the_oracle(seed):
 
 
 @pytest.mark.parametrize("seed", range(30))
-def test_nobody_finds_a_better_plan_at_random(seed):
+def test_no_random_plan_beats_the_optimum(seed):
     """No random plan beats the optimum in the project's order."""
     instance, rng = tiny_instance(seed), np.random.default_rng(seed)
     best = evaluate(instance, Allocation(brute_force(instance).plan))
@@ -28,7 +28,7 @@ def test_nobody_finds_a_better_plan_at_random(seed):
         assert not score.is_better_than(best, "makespan-energy") or score.violations
 
 
-def test_an_optimum_known_by_hand():
+def test_optimum_matches_hand_calculation():
     """Two agents of ability 2 and 1, tasks of 4 and 1: the strong one does the large task, T = 2, and flies 3."""
     instance = Instance(
         ability=[2, 1],
@@ -40,13 +40,13 @@ def test_an_optimum_known_by_hand():
     assert (best.unserved, best.makespan, best.energy, best.plan) == (0, 2.0, 3.0, (0, 1))
 
 
-def test_an_agent_that_must_travel_starts_late():
+def test_travel_delays_work():
     """Ability 2, workload 4, distance 3 at speed 1: three hours of flight and two of work."""
     instance = Instance(ability=[2], workload=[4], agent_position=[[0, 0]], task_position=[[3, 0]], speed=[1])
     assert brute_force(instance).makespan == 5.0
 
 
-def test_reach_ends_at_the_tolerance():
+def test_reach_has_a_tolerance():
     """A battery that is just enough, up to rounding, is enough."""
     instance = Instance(ability=[1], workload=[1], agent_position=[[0, 0]], task_position=[[0.3, 0]], battery=[0.3])
     assert reachable(instance)[1].all()

@@ -36,7 +36,7 @@ def defines(body: list[ast.stmt], name: str) -> bool:
 
 
 @pytest.mark.parametrize("page", PAGES)
-def test_every_name_is_in_the_code(page: str) -> None:
+def test_every_name_exists_in_the_code(page: str) -> None:
     """A function, class or constant that is renamed or moved takes its mention along."""
     named = references(page)
     files = {path: (ROOT if path.startswith("examples/") else CODE) / path for path, _ in named}
@@ -47,14 +47,14 @@ def test_every_name_is_in_the_code(page: str) -> None:
     assert missing == []
 
 
-def test_names_that_are_not_there_are_told() -> None:
+def test_unknown_names_are_detected() -> None:
     """Neither a wrong function nor a wrong member of a class passes."""
     body = ast.parse("LIMIT = 1\nclass A:\n    size: int = 2\n    def go(self): ...\n").body
     assert [defines(body, name) for name in ("LIMIT", "A", "A.size", "A.go")] == [True] * 4
     assert [defines(body, name) for name in ("go", "A.stop", "LIMIT.x", "A.go.x")] == [False] * 4
 
 
-def test_every_part_of_the_paper_has_its_word() -> None:
+def test_every_part_of_the_paper_is_covered() -> None:
     """Equations 1 to 19, all 39 lines of Algorithm 1, Table 1 and figures 1 to 6 are gone through."""
     text = text_of("paper/paper.md")
     assert [int(number) for number in re.findall(r"\*\*\((\d+)\)\*\*", text)] == list(range(1, 20))

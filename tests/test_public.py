@@ -43,7 +43,7 @@ def routines(package: ModuleType) -> Iterator[tuple[str, object]]:
 
 
 @pytest.mark.parametrize("package", PACKAGES, ids=lambda package: package.__name__)
-def test_everything_public_is_documented(package: ModuleType) -> None:
+def test_public_objects_are_documented(package: ModuleType) -> None:
     """Each object has a docstring; each function describes its parameters and what it returns."""
     gaps = []
     for name, value in {**dict(public(package)), **dict(routines(package))}.items():
@@ -61,7 +61,7 @@ def test_everything_public_is_documented(package: ModuleType) -> None:
 
 
 @pytest.mark.parametrize("package", PACKAGES, ids=lambda package: package.__name__)
-def test_everything_public_is_typed(package: ModuleType) -> None:
+def test_public_functions_are_typed(package: ModuleType) -> None:
     """Each parameter and each return value of each function and method has a type."""
     gaps = []
     for name, value in routines(package):
@@ -73,7 +73,7 @@ def test_everything_public_is_typed(package: ModuleType) -> None:
     assert gaps == []
 
 
-def test_verbs_and_methods_are_at_hand() -> None:
+def test_main_functions_and_methods_are_public() -> None:
     """What users need is there by name, the class of every built-in method among it."""
     assert set(alloc.allocators.__all__) >= VERBS | METHODS
     classes = {target.partition(":")[2] for target in alloc.allocators.registry.TARGETS.values()}
@@ -90,7 +90,7 @@ def test_verbs_and_methods_are_at_hand() -> None:
         ("import alloc.allocators.pareto, alloc.allocators.explain; from alloc.allocators import explain", "function"),
     ],
 )
-def test_verbs_are_not_hidden_by_their_modules(statement: str, kind: str) -> None:
+def test_functions_are_not_shadowed_by_modules(statement: str, kind: str) -> None:
     """`solve`, `pareto` and `explain` stay functions, whichever of module and function is imported first."""
     code = f"import alloc.allocators; {statement}; print(*(type(getattr(alloc.allocators, name)).__name__ for name in "
     code += "('solve', 'pareto', 'explain')))"

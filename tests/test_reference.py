@@ -30,7 +30,7 @@ def pages(script: ModuleType) -> dict[str, str]:
     return made
 
 
-def test_the_pages_are_up_to_date(pages: dict[str, str]) -> None:
+def test_pages_are_up_to_date(pages: dict[str, str]) -> None:
     """They are those of the docstrings, and no others; `python docs/make_reference.py` writes them anew."""
     folder = DOCS / "reference"
     assert {path.relative_to(folder).as_posix(): path.read_text("utf-8") for path in folder.rglob("*.md")} == pages
@@ -46,7 +46,7 @@ def test_every_public_name_has_a_page(pages: dict[str, str]) -> None:
     assert sorted(rows) == sorted((path.rpartition("/")[2][:-3], path) for path in pages if path != "index.md")
 
 
-def test_no_two_pages_are_one_where_names_have_no_case(pages: dict[str, str]) -> None:
+def test_page_names_differ_without_case(pages: dict[str, str]) -> None:
     """As on macOS and Windows."""
     assert len({path.casefold() for path in pages}) == len(pages)
 

@@ -47,7 +47,7 @@ def test_every_page_is_in_the_navigation() -> None:
     assert set(named) == pages | made | {"examples/README.md", "CONTRIBUTING.md", "CHANGELOG.md"}
 
 
-def test_lists_are_lists_in_the_site() -> None:
+def test_lists_are_preceded_by_empty_lines() -> None:
     """A list that follows a paragraph does so after an empty line, without which it is a part of it."""
     found = {}
     for path in [*DOCS.rglob("*.md"), ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md"]:
@@ -56,7 +56,7 @@ def test_lists_are_lists_in_the_site() -> None:
     assert {name: lines for name, lines in found.items() if lines} == {}
 
 
-def test_the_page_of_all_options_has_all_of_them() -> None:
+def test_page_of_options_is_complete() -> None:
     """Every command has a chapter, with each option that its help shows."""
     page = loaded("make_commands").page()
     chapters = dict(re.findall(r"^## alloc ([\w-]+)\n(.*?)(?=^## |\Z)", page, re.MULTILINE | re.DOTALL))
@@ -68,7 +68,7 @@ def test_the_page_of_all_options_has_all_of_them() -> None:
         ] == []
 
 
-def test_the_table_of_methods_says_what_they_can() -> None:
+def test_table_of_methods_matches_their_capabilities() -> None:
     """Each method has a page that is linked, and the marks of the table are those of its description."""
     page = (DOCS / "methods" / "index.md").read_text("utf-8")
     rows = re.findall(r"^\| (`[^|]*`) \|(.*)\|$", page.split("## What each can do")[1].split("## ")[0], re.MULTILINE)
@@ -85,7 +85,7 @@ def test_the_table_of_methods_says_what_they_can() -> None:
         assert re.search(rf"\[[^\]]*`{name}`[^\]]*\]\([\w-]+\.md\)", page), name
 
 
-def test_the_picture_of_the_layers_has_every_package() -> None:
+def test_diagram_of_layers_has_every_package() -> None:
     """A folder that is added to a package stands in the picture of the architecture."""
     picture = (DOCS / "developing" / "architecture.svg").read_text("utf-8")
     folders = [
@@ -96,7 +96,7 @@ def test_the_picture_of_the_layers_has_every_package() -> None:
     assert [name for name in folders if f"{name}/" not in picture] == []
 
 
-def test_a_notebook_becomes_a_page(tmp_path: Path) -> None:
+def test_notebook_becomes_a_page(tmp_path: Path) -> None:
     """Text stays, code and what it printed are fenced, and a picture is a file of its own beside the page."""
     png = {"output_type": "execute_result", "data": {"image/png": ["aGk=\n"], "text/plain": ["<Image>"]}}
     said = {"output_type": "stream", "text": ["1\n", "2\n"]}
@@ -118,7 +118,7 @@ def test_a_notebook_becomes_a_page(tmp_path: Path) -> None:
 
 
 @pytest.mark.needs("mkdocs")
-def test_links_out_of_docs_lead_into_the_site(hooks: ModuleType) -> None:
+def test_links_out_of_docs_point_into_the_site(hooks: ModuleType) -> None:
     """Files beside docs/ stand beside its pages in the site, and a label that is a file's name becomes its title."""
     assert hooks.site_links("[e](../../examples/replan.py)", "use/replanning.md") == "[e](../examples/replan.py)"
     assert hooks.site_links("[p](../../examples/plugin)", "use/plugins.md") == "[p](../examples/plugin/README.md)"
@@ -128,7 +128,7 @@ def test_links_out_of_docs_lead_into_the_site(hooks: ModuleType) -> None:
 
 
 @pytest.mark.needs("mkdocs")
-def test_classes_are_links_to_the_reference(hooks: ModuleType) -> None:
+def test_classes_are_linked_to_the_reference(hooks: ModuleType) -> None:
     """Their names in sentences are; those in code, headings and links are not, nor are functions on other pages."""
     reference = {"Search": "reference/classes/Search.md", "solve": "reference/functions/solve.md"}
     for text in (
@@ -147,7 +147,7 @@ def test_classes_are_links_to_the_reference(hooks: ModuleType) -> None:
 
 
 @pytest.mark.needs("mkdocs")
-def test_the_navigation_has_a_page_for_each_name(hooks: ModuleType) -> None:
+def test_navigation_has_a_page_for_each_name(hooks: ModuleType) -> None:
     """Those of the reference are in the navigation once, below the table of all of them, by topic."""
     nav = [{"Reference": [{"Python": "reference/index.md"}]}]
     config = hooks.on_config(SimpleNamespace(nav=nav))
@@ -158,7 +158,7 @@ def test_the_navigation_has_a_page_for_each_name(hooks: ModuleType) -> None:
 
 
 @pytest.mark.needs("mkdocs")
-def test_what_loads_from_the_network_is_noticed(hooks: ModuleType) -> None:
+def test_network_resources_are_detected(hooks: ModuleType) -> None:
     """Scripts, styles and pictures of other hosts are; files of the site and links for readers are not."""
     for text in (
         '<script src="https://x.org/a.js">',

@@ -50,21 +50,21 @@ def test_equal_agents_count_once() -> None:
     assert choose(instance, Objective.MAKESPAN, Budget(1.0))[0] == "cpsat"
 
 
-def test_more_time_favours_a_proof() -> None:
+def test_longer_limits_favour_exact_methods() -> None:
     """With a minute or without a limit, a solver is picked where with a second it is not."""
     instance = scattered(500, 50, whole=True)
     picks = [choose(instance, Objective.MAKESPAN_ENERGY, Budget(seconds))[0] for seconds in (1.0, 60.0, None)]
     assert picks == ["local-search", "milp", "milp"]
 
 
-def test_travel_times_and_real_abilities_favour_the_bounds_of_exact_methods() -> None:
+def test_travel_times_and_real_abilities_favour_exact_methods() -> None:
     """Where already the makespan is hard, the exact methods get the run, as whole abilities alone would not."""
     cases = [scattered(500, 50, whole=True), scattered(500, 50), scattered(500, 50, whole=True, speed=1.0)]
     picks = [choose(each, Objective.MAKESPAN_ENERGY, Budget(3.0))[0] for each in cases]
     assert picks == ["local-search", "milp", "milp"]
 
 
-def test_the_reason_is_a_sentence_for_one_pair_as_for_many() -> None:
+def test_reason_is_grammatical_for_one_and_many_pairs() -> None:
     """One agent and one task are a pair, and the time is told in few digits."""
     one = Instance(ability=[1], workload=[1])
     assert choose(one, Objective.MAKESPAN, Budget(0.0308532))[1].startswith(

@@ -102,7 +102,7 @@ def test_no_method_is_left_out():
     assert tested - {""} == set(BUILT_IN)
 
 
-def test_who_refuses_what():
+def test_expected_refusals():
     """The suite skips what a method refuses: finite speeds for three methods, slack for two, and nothing else."""
     refused = set()
     for name in BUILT_IN:
@@ -118,7 +118,7 @@ def test_who_refuses_what():
     assert refused == speeds | {("greedy", "slack"), ("ga", "slack")}
 
 
-def test_a_subclass_must_say_what_it_tests():
+def test_subclass_without_method_fails():
     """A subclass without a name and without an allocator fails, rather than testing nothing."""
     with pytest.raises(InputError, match="no method ''"):
         AllocatorConformance().allocator()

@@ -388,7 +388,7 @@ def test_every_check_can_fail():
     assert {check for _, check, _ in DEFECTS} == CHECKS
 
 
-def test_refusals_are_checked():
+def test_refusals_are_verified():
     """A method that refuses travel times is skipped on them, and found out if `solve` lets it through after all."""
 
     class Refusing(Sound):
@@ -398,7 +398,7 @@ def test_refusals_are_checked():
         Suite().test_answer_is_sound(Refusing(), "travel times", MAKESPAN)
 
 
-def test_pytest_is_loaded_by_the_suite_alone():
+def test_only_the_suite_imports_pytest():
     """Importing the allocators does not import pytest, which users need not have."""
     import subprocess
 

@@ -5,7 +5,7 @@ from alloc.allocators.explain import explain, makespan_with_agent
 from alloc.problems import Allocation, Instance, evaluate
 
 
-def test_enough_is_the_least_ability_that_hands_over():
+def test_enough_is_the_least_ability_that_moves_the_bottleneck():
     """With `enough` the next task is the last; with a little less the makespan is longer; with more it is the same."""
     instance = Instance(ability=[5, 5, 4], workload=[12, 4, 1])
     allocation = Allocation([0, 1, 2])
@@ -24,7 +24,7 @@ def test_enough_is_the_least_ability_that_hands_over():
     assert found.use == pytest.approx(17 / (14 * 2.4))
 
 
-def test_travel_counts_for_those_who_are_there_already():
+def test_travel_times_count_for_the_present_group():
     """With finite speeds the group works from arrival on, and the further agent from hour 0 on."""
     instance = Instance(
         ability=[2, 1],
@@ -39,7 +39,7 @@ def test_travel_counts_for_those_who_are_there_already():
     assert found.enough.makespan == pytest.approx(2.0)
 
 
-def test_last_together():
+def test_tied_bottlenecks():
     """Where several tasks are last, no single agent gains anything."""
     found = explain(Instance(ability=[1, 2], workload=[2, 4]), Allocation([0, 1]))
     assert found.last == (0, 1)
@@ -47,20 +47,20 @@ def test_last_together():
     assert found.use == 1
 
 
-def test_one_task():
+def test_single_task():
     """Without a next task there is only what a typical agent would gain."""
     found = explain(Instance(ability=[1, 3], workload=[8, 0]), Allocation([0, 0]))
     assert (found.next_task, found.enough) == (None, None)
     assert (found.typical.ability, found.typical.makespan) == (2, 8 / 6)
 
 
-def test_agents_that_cannot_be_there_do_not_count():
+def test_infeasible_agents_do_not_count():
     """An agent on a task that it may not do is not in the group."""
     instance = Instance(ability=[1, 3], workload=[8], allowed_tasks=[None, []])
     assert explain(instance, Allocation([0, 0])).agents == (0,)
 
 
 @pytest.mark.parametrize(("workload", "tasks"), [([1, 1], [0, 0]), ([0, 0], [0, 1])])
-def test_nothing_to_explain(workload, tasks):
+def test_no_bottleneck(workload, tasks):
     """Unserved tasks, or no work at all, hold no makespan up."""
     assert explain(Instance(ability=[1, 3], workload=workload), Allocation(tasks)) is None

@@ -17,7 +17,7 @@ def instance() -> Instance:
     return paper_like(6, 3, 24, 4)
 
 
-def test_front_is_that_of_brute_force(instance: Instance) -> None:
+def test_front_matches_brute_force(instance: Instance) -> None:
     """From the fastest to the cheapest of all, every point has the least energy within its makespan, and is proven."""
     best = brute_force(instance)
     front = pareto(instance, "milp", points=8, time_limit_s=30)
@@ -34,7 +34,7 @@ def test_front_is_that_of_brute_force(instance: Instance) -> None:
     assert list(energies) == sorted(energies, reverse=True)
 
 
-def test_an_earlier_front_is_gone_on_with(instance: Instance) -> None:
+def test_front_can_be_continued(instance: Instance) -> None:
     """The makespans of the allocations to begin with are limits again, and nothing gets worse."""
     first = pareto(instance, "milp", points=5, time_limit_s=30)
     known = [point.allocation for point in first.points if point.allocation is not None]
@@ -48,7 +48,7 @@ def test_an_earlier_front_is_gone_on_with(instance: Instance) -> None:
         assert min(within) <= point.energy * (1 + 1e-9)
 
 
-def test_stopping_keeps_what_is_found(instance: Instance) -> None:
+def test_stopped_run_keeps_the_front_so_far(instance: Instance) -> None:
     """Once stopped there is the front so far, with a point at the least, and it says that it is not complete."""
     stop, seen = threading.Event(), []
 
@@ -62,7 +62,7 @@ def test_stopping_keeps_what_is_found(instance: Instance) -> None:
     assert len(front.points) == len(seen) == 2
 
 
-def test_without_energy_the_front_is_a_point() -> None:
+def test_front_is_one_point_without_energy() -> None:
     """Where flying costs nothing the fastest allocation is all there is; where a task stays unserved too."""
     free = Instance(ability=[1, 2, 3], workload=[3, 3])
     assert [point.makespan for point in pareto(free, "milp").points] == [1.0]
@@ -72,7 +72,7 @@ def test_without_energy_the_front_is_a_point() -> None:
     assert [point.energy for point in pareto(nothing, "milp").points] == [0.0]
 
 
-def test_methods_without_use_for_slack_are_refused(instance: Instance) -> None:
+def test_methods_without_slack_are_refused(instance: Instance) -> None:
     """A method that cannot trade time for energy says so, and a front without points is an error."""
     with pytest.raises(RefusedError, match="slack"):
         pareto(instance, "ga", iterations=1, time_limit_s=None)
@@ -81,7 +81,7 @@ def test_methods_without_use_for_slack_are_refused(instance: Instance) -> None:
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_no_allocation_that_serves_all_is_slower_than_the_slowest(seed: int) -> None:
+def test_slowest_makespan_is_an_upper_bound(seed: int) -> None:
     """Whoever goes where, with speeds or without, the last task is done by then."""
     rng = np.random.default_rng(seed)
     instance = Instance(

@@ -35,7 +35,7 @@ def method(request: pytest.FixtureRequest) -> tuple[str, str | Allocator]:
 
 
 @pytest.mark.parametrize("objective", [Objective.MAKESPAN, Objective.MAKESPAN_ENERGY])
-def test_the_served_tasks_have_the_most_priority(method: tuple[str, str | Allocator], objective: Objective) -> None:
+def test_served_priority_is_maximal(method: tuple[str, str | Allocator], objective: Objective) -> None:
     """As many tasks as can be are served, the most urgent, and by exact methods at the least makespan and energy."""
     name, allocator = method
     for instance in SCARCE:
@@ -52,14 +52,14 @@ def test_the_served_tasks_have_the_most_priority(method: tuple[str, str | Alloca
             assert exact.energy == pytest.approx(best.energy, rel=1e-6, abs=1e-9)
 
 
-def test_one_agent_serves_the_urgent_one_of_two_tasks(method: tuple[str, str | Allocator]) -> None:
+def test_one_agent_serves_the_more_urgent_task(method: tuple[str, str | Allocator]) -> None:
     """Priority comes before work, and before a start that serves the other task."""
     instance = Instance(ability=[1], workload=[1, 50], priority=[1, 2])
     assert solve(instance, method[1], time_limit_s=1).allocation == Allocation([1])
     assert solve(instance, method[1], start=Allocation([0]), time_limit_s=1).allocation == Allocation([1])
 
 
-def test_equal_priorities_leave_the_choice_to_makespan_and_work() -> None:
+def test_equal_priorities_have_no_effect() -> None:
     """Any one priority for all is the same as none: the same plan to the bit."""
     for seed in range(30):
         instance = scarce_instance(seed)
@@ -72,7 +72,7 @@ def test_equal_priorities_leave_the_choice_to_makespan_and_work() -> None:
         assert find_shortage(plain).merged() == find_shortage(equal).merged()
 
 
-def test_unserved_priority_is_compared_after_their_number_and_before_the_makespan() -> None:
+def test_order_of_objectives_with_priorities() -> None:
     """A plan is better with fewer unserved tasks, then with less urgent ones, then with a shorter makespan."""
     instance = Instance(ability=[1, 1], workload=[1, 5, 9, 2], priority=[1, 3, 3, 0])
     plans = [[1, 2], [2, 1], [1, 0], [0, 3], [1, 1], [3, 3]]

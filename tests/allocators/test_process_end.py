@@ -52,7 +52,7 @@ def run(method: str, after_s: float, how: str, times: int = 1) -> subprocess.Com
 
 
 @pytest.mark.parametrize("method", [MILP, pytest.param("cpsat", marks=pytest.mark.slow), GAPPO, "local-search"])
-def test_a_daemon_thread_is_stopped_and_awaited(method: str) -> None:
+def test_daemon_thread_is_stopped_and_awaited(method: str) -> None:
     """However often it solves, its run is ended as by a stop event, the next is none, and nothing crashes."""
     ran = run(method, 0.8, "daemon", 1000)
     assert (ran.returncode, ran.stderr) == (0, "")
@@ -60,7 +60,7 @@ def test_a_daemon_thread_is_stopped_and_awaited(method: str) -> None:
 
 
 @pytest.mark.slow
-def test_an_interrupt_of_the_main_thread_crashes_nothing() -> None:
+def test_interrupted_join_does_not_crash() -> None:
     """Ctrl-C in `join`, after which some versions of Python take the other thread for ended: no abort."""
     ran = run("milp", 0.8, "interrupted")
     assert ran.returncode in (-signal.SIGINT, 130), ran.stderr
@@ -68,7 +68,7 @@ def test_an_interrupt_of_the_main_thread_crashes_nothing() -> None:
 
 
 @pytest.mark.parametrize(("method", "after_s"), ENDS)
-def test_a_thread_that_is_joined_has_its_whole_time(method: str, after_s: float) -> None:
+def test_joined_thread_keeps_its_time_limit(method: str, after_s: float) -> None:
     """The end of the program waits for it; that pools take no work by then costs no answer."""
     ran = run(method, after_s, "joined")
     assert (ran.returncode, ran.stderr) == (0, "")
@@ -76,7 +76,7 @@ def test_a_thread_that_is_joined_has_its_whole_time(method: str, after_s: float)
 
 
 @pytest.mark.slow
-def test_a_run_may_begin_at_exit() -> None:
+def test_run_can_start_at_exit() -> None:
     """A handler of `atexit`, registered before or after, may still solve."""
     program = """
 import atexit
@@ -93,7 +93,7 @@ atexit.register(late)
     assert (ran.returncode, ran.stdout, ran.stderr) == (0, "optimal\noptimal\n", "")
 
 
-def test_a_pool_that_gets_no_threads_works_all_the_same() -> None:
+def test_pool_without_threads_runs_in_the_caller() -> None:
     """Once it is shut down, work is done in the calling thread, and what that raises is raised by the future."""
     pool = Pool(2)
     pool.shutdown()

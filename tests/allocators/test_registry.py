@@ -30,7 +30,7 @@ TWO = Instance(ability=[5, 3], workload=[6, 4])
 
 
 @pytest.mark.parametrize("name", list(registry.BUILT_IN))
-def test_ours_load(name: str) -> None:
+def test_built_in_methods_load(name: str) -> None:
     """Every method that is listed can be loaded, and is described by the very entry it is listed under."""
     allocator = load(name)
     assert isinstance(allocator, Allocator)
@@ -39,7 +39,7 @@ def test_ours_load(name: str) -> None:
     assert allocator.method.citation
 
 
-def test_unknown_names() -> None:
+def test_unknown_names_get_a_hint() -> None:
     """A slip gets the nearest name, for methods and options."""
     with pytest.raises(InputError, match="did you mean 'greedy'"):
         load("gredy")
@@ -50,7 +50,7 @@ def test_unknown_names() -> None:
             ask("auto")
 
 
-def test_options_of_other_methods() -> None:
+def test_options_of_other_methods_are_refused() -> None:
     """Whoever gives an option to the wrong method hears which one takes it, and no empty list of what is known."""
     takers = "gappo, gappo-ls, ppo, a2c, dqn, ddpg do"
     with pytest.raises(InputError, match=rf"'greedy' takes no option 'policy'; {takers}$"):
@@ -59,12 +59,12 @@ def test_options_of_other_methods() -> None:
         load("greedy", colour="x")
 
 
-def test_options_that_are_none_are_left_out() -> None:
+def test_options_of_none_are_ignored() -> None:
     """A command line passes on all its options; those not given do not count."""
     assert load("greedy", policy=None).method.name == "greedy"
 
 
-def test_what_is_missing_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_missing_packages_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
     """A method whose modules are not installed says what to install."""
     monkeypatch.setitem(registry.BUILT_IN, "greedy", Method(name="greedy", summary="", requires=("no_such_module",)))
     with pytest.raises(InputError, match="pip install no_such_module"):
@@ -125,7 +125,7 @@ def test_parameters_reach_the_method() -> None:
         ({"parameters": 5}, "parameters", "must be a Faces"),
     ],
 )
-def test_wrong_parameters_are_named(settings: dict[str, object], place: str, words: str) -> None:
+def test_wrong_parameters_are_errors_that_name_them(settings: dict[str, object], place: str, words: str) -> None:
     """An unknown name gets the nearest one, a wrong value its parameter, at `load`, `solve` and the class alike."""
     for run in (partial(load, "dice"), partial(solve, Instance(ability=[1], workload=[1]), "dice")):
         with pytest.raises(InputError, match=words) as caught:
@@ -136,7 +136,7 @@ def test_wrong_parameters_are_named(settings: dict[str, object], place: str, wor
             Dice(**settings)
 
 
-def test_methods_without_parameters_take_none() -> None:
+def test_parameters_of_methods_without_any_are_refused() -> None:
     """What would be ignored is an error."""
 
     class Plain(Allocator):
@@ -165,7 +165,7 @@ def test_every_parameter_is_described(name: str) -> None:
     assert [one.name for one in found if not (one.meaning and one.kind)] == []
 
 
-def test_unknown_parameters_are_answered_by_all_that_there_are() -> None:
+def test_unknown_parameter_error_lists_all_parameters() -> None:
     """A name that is none, and one with a slip, both get the list of what the method takes; one line each."""
     for given in ("colour", "populatoin"):
         with pytest.raises(InputError, match=r"known are population, population_genes, .*distance_weight$") as caught:
@@ -190,7 +190,7 @@ def test_parameters_are_in_the_result_and_its_label() -> None:
     assert several.to_dict()["parameters"] == {"communication_radius": "inf"}
 
 
-def test_rows_of_one_method_are_told_apart_by_parameters() -> None:
+def test_rows_of_one_method_are_labelled_by_parameters() -> None:
     """Two allocators of one method have rows of their own, named as ``alloc compare`` takes them."""
     rows = list(compare([TWO], [GeneticAlgorithm(population=8), GeneticAlgorithm()], iterations=1))
     assert [row.method for row in rows] == ["ga[population=8]", "ga"]

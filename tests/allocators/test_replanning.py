@@ -61,7 +61,7 @@ def best_cost(number: int, objective: Objective, price: float) -> tuple[int, flo
 @pytest.mark.parametrize(
     "method", [pytest.param(method, marks=[pytest.mark.slow] * (method in LONG)) for method in METHODS]
 )
-def test_moves_against_brute_force(method: str, objective: Objective, price: float) -> None:
+def test_moves_match_brute_force(method: str, objective: Objective, price: float) -> None:
     """Exact methods find the least cost of moves with all pins kept, and no method claims less."""
     allocator = load(method)
     for number, (instance, plan, pins) in enumerate(cases()):
@@ -94,7 +94,7 @@ def test_moves_against_brute_force(method: str, objective: Objective, price: flo
             assert moves.cost == pytest.approx(cost, rel=1e-6, abs=1e-9)
 
 
-def test_a_plan_for_another_state_of_affairs() -> None:
+def test_plan_for_a_changed_instance_is_adapted() -> None:
     """Agents and tasks that have gone are said and left out; those without a task move at no price."""
     then = Instance(
         ability=[1, 2, 3, 4], workload=[2, 3, 4], task_position=[[0, 0], [1, 0], [2, 0]], start_task=[0] * 4
@@ -120,7 +120,7 @@ def test_a_plan_for_another_state_of_affairs() -> None:
         ({"start": {"b1": "t1"}}, "names no agent"),
     ],
 )
-def test_errors(arguments: dict, message: str) -> None:
+def test_invalid_arguments_are_refused(arguments: dict, message: str) -> None:
     """What cannot be meant is refused before the run."""
     instance = Instance(
         ability=[1, 1],
@@ -133,7 +133,7 @@ def test_errors(arguments: dict, message: str) -> None:
         solve(instance, "greedy", **arguments)
 
 
-def test_what_is_proven_with_pins_is_said_to_hold_for_them() -> None:
+def test_proofs_with_pins_are_qualified() -> None:
     """A bound with a pin is none without it: the result has its pins, and the summary says so."""
     instance = Instance(ability=[5, 1], workload=[10, 1])
     result = solve(instance, "cpsat", pins={"a1": "t2"})
@@ -146,7 +146,7 @@ def test_what_is_proven_with_pins_is_said_to_hold_for_them() -> None:
 
 @pytest.mark.parametrize("method", EXACT)
 @pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.slow), pytest.param(2, marks=pytest.mark.slow)])
-def test_the_energy_stage_counts_costs(method: str, seed: int) -> None:
+def test_energy_stage_minimises_costs(method: str, seed: int) -> None:
     """Flights back of all cost what twice the energy does: the same optimum, proven, with many pairs."""
     rng = np.random.default_rng(seed)
     fields = {
@@ -161,7 +161,7 @@ def test_the_energy_stage_counts_costs(method: str, seed: int) -> None:
     assert back.energy == pytest.approx(twice.energy, rel=1e-6)
 
 
-def test_improvements_are_those_of_the_instance() -> None:
+def test_improvements_refer_to_the_given_instance() -> None:
     """Pinned agents are at their tasks in what the callback gets, and their flights count there and in the trace."""
     instance = varied_instance(3, {"rates"})
     agent, task = next(iter(np.argwhere(instance.reach.mask[instance.reach.origin]).tolist()))
@@ -180,7 +180,7 @@ def test_improvements_are_those_of_the_instance() -> None:
     assert result.trace[-1].energy == pytest.approx(result.energy)
 
 
-def test_a_pin_alone_leaves_large_instances_to_greedy() -> None:
+def test_pins_need_no_table_of_pairs() -> None:
     """Where no cost counts, a pin is a list of one task: nothing needs a table of all pairs."""
     rng = np.random.default_rng(0)
     instance = Instance(

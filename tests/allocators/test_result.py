@@ -49,12 +49,12 @@ def result(tasks: list[int], bound: float | None, energy_bound: float | None = N
         (([0, 1, 0], 0.9, 1.0, "makespan-energy"), Status.FEASIBLE),
     ],
 )
-def test_status(arguments: tuple, status: Status) -> None:
+def test_status_requires_proof_of_every_stage(arguments: tuple, status: Status) -> None:
     """Optimal takes a proof of every stage of the objective, to 1e-6."""
     assert result(*arguments).status is status
 
 
-def test_gaps() -> None:
+def test_gaps_match_the_definition() -> None:
     """(value - bound) / value, 0 where nothing is left to gain, none where there is nothing to compare."""
     assert relative_gap(2.0, 1.5) == 0.25
     assert relative_gap(0.0, 0.0) == 0.0
@@ -63,7 +63,7 @@ def test_gaps() -> None:
     assert result([0, 0, 0], 1.0).gap is None
 
 
-def test_format() -> None:
+def test_document_has_every_field() -> None:
     """Every field of the format is there, every agent is assigned, and it is plain JSON."""
     document = result([0, 1, -1], 1.0).to_dict()
     assert json.loads(json.dumps(document, allow_nan=False)) == document
@@ -76,7 +76,7 @@ def test_format() -> None:
     assert set(fields.split()) <= set(document)
 
 
-def test_unserved_tasks_have_names() -> None:
+def test_unserved_tasks_are_given_by_id() -> None:
     """Tasks are told by id, and the makespan is null."""
     document = result([0, 0, 0], None).to_dict()
     assert document["unserved_tasks"] == ["t2"]
@@ -160,14 +160,14 @@ def test_wrong_documents_are_refused(tmp_path: Path, field: str, value: object, 
         read_result(path, good.instance)
 
 
-def test_another_instance_is_refused() -> None:
+def test_result_of_another_instance_is_refused() -> None:
     """A result does not pass for one of an instance on which its allocation scores otherwise."""
     document = result([0, 1, -1], 1.0).to_dict()
     with pytest.raises(InputError, match=r"makespan: is 1\.33"):
         Result.from_dict(document, Instance(ability=[3, 2, 1], workload=[8, 2]))
 
 
-def test_printing_gives_the_summary() -> None:
+def test_str_is_the_summary() -> None:
     """The text has status, makespan and bottleneck, and is that of the command line."""
     text = str(result([0, 1, -1], 1.0))
     assert text.startswith("three (3 agents, 2 tasks), test: every task is served; optimality is not proven\n")
@@ -175,7 +175,7 @@ def test_printing_gives_the_summary() -> None:
     assert "Bottleneck: task t1 at 1.33333," in text
 
 
-def test_the_table_has_a_row_per_agent() -> None:
+def test_table_has_a_row_per_agent() -> None:
     """Where each agent goes, how far that is, and when its task is done; nothing where there is no allocation."""
     pytest.importorskip("pandas")
     found = result([0, 1, -1], 1.0)
@@ -189,7 +189,7 @@ def test_the_table_has_a_row_per_agent() -> None:
     assert replace(found, allocation=None, evaluation=None).to_frame().empty
 
 
-def test_the_table_needs_pandas(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_table_needs_pandas(monkeypatch: pytest.MonkeyPatch) -> None:
     """Without pandas the error says what to install."""
     monkeypatch.setitem(sys.modules, "pandas", None)
     with pytest.raises(MissingPackageError, match="pip install pandas"):

@@ -41,7 +41,7 @@ def far_and_wide() -> Instance:
 
 @pytest.mark.parametrize("method", ["ga", "gappo", "milp", "cpsat"])
 @pytest.mark.parametrize("objective", OBJECTIVES)
-def test_refusals_are_quick(far_and_wide: Instance, method: str, objective: Objective) -> None:
+def test_refusals_are_fast(far_and_wide: Instance, method: str, objective: Objective) -> None:
     """A method that cannot hold a table of all pairs says so before anybody builds one, and names its limit."""
     allocator = load(method)
     instance = far_and_wide
@@ -60,7 +60,7 @@ def test_refusals_are_quick(far_and_wide: Instance, method: str, objective: Obje
         for objective in OBJECTIVES
     ],
 )
-def test_greedy_with_complete_reach(starts: str, objective: Objective) -> None:
+def test_greedy_with_complete_reach_is_near_the_bound(starts: str, objective: Objective) -> None:
     """200,000 agents and 2,500 tasks: within a tenth of a per cent of the bound, whatever the agents begin at."""
     instance = random_instance(Family(agents=200_000, tasks=2_500, starts=starts), 0)
     result = solve(instance, "greedy", objective=objective, time_limit_s=60)
@@ -70,7 +70,7 @@ def test_greedy_with_complete_reach(starts: str, objective: Objective) -> None:
     assert evaluate(instance, result.allocation).energy == result.energy
 
 
-def test_without_time_tasks_are_served_all_the_same(far_and_wide: Instance) -> None:
+def test_repair_after_zero_time_serves_tasks(far_and_wide: Instance) -> None:
     """The repair after a run that had no time takes seconds at the most, where everyone reaches everything or not."""
     free = Instance(
         ability=np.ones(300_000), workload=np.ones(5_000), task_position=np.random.default_rng(0).random((5_000, 3))
@@ -81,7 +81,7 @@ def test_without_time_tasks_are_served_all_the_same(far_and_wide: Instance) -> N
         assert not result.evaluation.unserved_tasks
 
 
-def test_auto_picks_at_once(far_and_wide: Instance) -> None:
+def test_auto_picks_without_delay(far_and_wide: Instance) -> None:
     """What cannot be held is not picked."""
     begin = time.process_time()
     for objective in OBJECTIVES:

@@ -37,7 +37,7 @@ def scarce(seed: int) -> Instance:
     )
 
 
-def test_the_least_work_is_served_where_all_reach_everything(method):
+def test_smallest_tasks_are_served_with_complete_reach(method):
     """The optimum of n agents for more tasks: the n smallest workloads against the abilities, both sorted."""
     for seed in range(3):
         rng = np.random.default_rng(seed)
@@ -52,7 +52,7 @@ def test_the_least_work_is_served_where_all_reach_everything(method):
 
 
 @pytest.mark.parametrize("objective", ["makespan", "makespan-energy"])
-def test_short_reach_against_brute_force(method, objective):
+def test_short_reach_matches_brute_force(method, objective):
     """Exact methods serve as brute force does, at the same energy; the others are at most 1.5 times slower."""
     name, allocator = method
     for seed in range(12):
@@ -72,7 +72,7 @@ def test_short_reach_against_brute_force(method, objective):
             assert score.energy == pytest.approx(best.energy, rel=1e-6, abs=1e-9)
 
 
-def test_start_that_serves_less_is_improved_on(method):
+def test_start_that_serves_less_is_improved(method):
     """A warm start that serves the wrong tasks is left behind, and no agent stays where it cannot go."""
     instance = scarce(5)
     best = brute_force(instance)

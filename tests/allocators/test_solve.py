@@ -43,7 +43,7 @@ def instance() -> Instance:
     return Instance(ability=[3, 2, 1], workload=[4, 2], task_position=[[0, 0], [1, 0]], start_task=[0, 0, 0])
 
 
-def test_scores_what_is_proposed(instance: Instance) -> None:
+def test_proposals_are_scored_by_the_evaluator(instance: Instance) -> None:
     """The makespan is the evaluator's, and proof comes from the bounds alone."""
     result = solve(instance, Answers(Proposal(Allocation([0, 1, 0]))))
     assert (result.makespan, result.status, result.stop_reason) == (1.0, Status.OPTIMAL, StopReason.PROVEN)
@@ -56,7 +56,7 @@ def test_scores_what_is_proposed(instance: Instance) -> None:
     assert poor.gap == pytest.approx(0.25)
 
 
-def test_counted_runs_have_one_thread(instance: Instance) -> None:
+def test_runs_with_iteration_limits_use_one_thread(instance: Instance) -> None:
     """Iterations without a time limit mean the same on every machine: one thread unless more are asked for."""
     seen = []
 
@@ -72,14 +72,14 @@ def test_counted_runs_have_one_thread(instance: Instance) -> None:
     assert seen == [1, 3, available_threads()]
 
 
-def test_serves_what_was_left_unserved(instance: Instance) -> None:
+def test_unserved_tasks_are_repaired(instance: Instance) -> None:
     """A method that forgets a task is mended, whatever else it left."""
     result = solve(instance, Answers(Proposal(Allocation([0, 0, 0]))))
     assert result.evaluation is not None
     assert result.evaluation.unserved_tasks == ()
 
 
-def test_infeasible_comes_with_a_plan_and_a_reason(contested: Instance) -> None:
+def test_infeasible_result_has_a_plan_and_a_reason(contested: Instance) -> None:
     """Where no allocation serves all, the best partial plan comes along and the tasks that compete are named."""
     result = solve(contested, "greedy")
     assert result.status is Status.INFEASIBLE
@@ -89,20 +89,20 @@ def test_infeasible_comes_with_a_plan_and_a_reason(contested: Instance) -> None:
     assert any("only 2 agents can take any of the 3 tasks 't1', 't2', 't4'" in note for note in result.notes)
 
 
-def test_nobody_can_take_a_task() -> None:
+def test_task_without_able_agent_is_explained() -> None:
     """The reason is put simply where it is simple."""
     result = solve(Instance(ability=[1], workload=[1], allowed_tasks=[[]]), "greedy")
     assert result.notes == ("no agent can take task 't1'",)
     assert result.status is Status.INFEASIBLE
 
 
-def test_no_solution(instance: Instance) -> None:
+def test_proposing_nothing_gives_no_solution(instance: Instance) -> None:
     """A method that proposes nothing has no solution, and no makespan."""
     result = solve(instance, Answers(Proposal()))
     assert (result.status, result.allocation, result.makespan) == (Status.NO_SOLUTION, None, None)
 
 
-def test_energy_must_be_proven_as_well(instance: Instance) -> None:
+def test_optimality_requires_proof_of_energy(instance: Instance) -> None:
     """At the least makespan, but with energy that is not known to be the least, a run is finished, not proven."""
     far = Instance(
         ability=[1, 2, 3], workload=[3, 3], task_position=[[1, 0], [0, 0]], start_task=[1, 0, 0], energy_per_distance=1
@@ -115,7 +115,7 @@ def test_energy_must_be_proven_as_well(instance: Instance) -> None:
     assert result.energy_gap > 0.1
 
 
-def test_no_energy_is_the_least() -> None:
+def test_zero_energy_is_proven() -> None:
     """Where nobody flies the energy is proven, also where no linear programme of this size is solved."""
     rng = np.random.default_rng(0)
     large = Instance(ability=rng.uniform(1, 2, 3000), workload=np.ones(300), allowed_tasks=[[0]] + [None] * 2999)
@@ -125,7 +125,7 @@ def test_no_energy_is_the_least() -> None:
     assert (result.energy, result.energy_lower_bound, result.energy_gap) == (0.0, 0.0, 0.0)
 
 
-def test_refusals(instance: Instance) -> None:
+def test_refusals_are_raised_beforehand(instance: Instance) -> None:
     """The objective, finite speeds and the method's own reason refuse beforehand, and say why."""
     idle = Proposal(Allocation.idle(instance))
     with pytest.raises(RefusedError, match="does not optimise makespan-energy"):
@@ -138,13 +138,13 @@ def test_refusals(instance: Instance) -> None:
             solve(moving, method)
 
 
-def test_a_start_is_never_lost(instance: Instance) -> None:
+def test_warm_start_is_never_lost(instance: Instance) -> None:
     """An answer worse than the warm start gives way to it."""
     result = solve(instance, Answers(Proposal(Allocation([1, 0, 1]))), start=Allocation([0, 1, 0]))
     assert result.makespan == 1.0
 
 
-def test_starts_that_break_rules_are_mended() -> None:
+def test_infeasible_starts_are_repaired() -> None:
     """Agents that can no longer go where a start has them do not go there in the answer."""
     instance = Instance(ability=[1, 2, 3], workload=[3, 3], allowed_tasks=[[0], [0], [1]])
     result = solve(instance, Answers(Proposal()), start=Allocation([1, 0, 1]))
@@ -152,7 +152,7 @@ def test_starts_that_break_rules_are_mended() -> None:
     assert result.evaluation.violations == ()
 
 
-def test_stop_from_outside(instance: Instance) -> None:
+def test_stop_event_ends_a_run(instance: Instance) -> None:
     """An event that is set ends a run that would have gone on for a minute, and says so."""
     stop = threading.Event()
     hard = Instance(ability=np.random.default_rng(0).uniform(1, 10, 40), workload=[3.3, 5.9, 7.1, 9.7])
@@ -165,7 +165,7 @@ def test_stop_from_outside(instance: Instance) -> None:
     assert result.makespan is not None
 
 
-def test_callbacks_may_end_a_run(instance: Instance) -> None:
+def test_callback_exceptions_end_a_run(instance: Instance) -> None:
     """What a callback raises reaches the caller."""
 
     def enough(step: Improvement) -> None:
@@ -175,7 +175,7 @@ def test_callbacks_may_end_a_run(instance: Instance) -> None:
         solve(instance, Answers(Proposal(Allocation([0, 1, 0]))), on_improvement=enough)
 
 
-def test_options_need_a_name(instance: Instance) -> None:
+def test_parameters_with_an_allocator_object_are_refused(instance: Instance) -> None:
     """An allocator has its parameters already: more of them are an error, not lost."""
     with pytest.raises(InputError, match="with its own parameters; set policy when creating it"):
         solve(instance, load("greedy"), policy="x.safetensors")
@@ -183,7 +183,7 @@ def test_options_need_a_name(instance: Instance) -> None:
         solve(instance, "greedy", policy="x.safetensors")
 
 
-def test_auto_takes_no_options(instance: Instance) -> None:
+def test_auto_takes_no_parameters(instance: Instance) -> None:
     """What it picks depends on the size: an option that one method takes needs that method's name."""
     with pytest.raises(InputError, match="needs a named method that has it"):
         solve(instance, "auto", policy="x.safetensors")
@@ -191,13 +191,13 @@ def test_auto_takes_no_options(instance: Instance) -> None:
 
 
 @pytest.mark.parametrize("wrong", [{"seed": -1}, {"seed": 2**63}, {"threads": 0}, {"threads": 10**20}])
-def test_numbers_that_no_solver_takes(instance: Instance, wrong: dict[str, int]) -> None:
+def test_seeds_and_threads_out_of_range_are_refused(instance: Instance, wrong: dict[str, int]) -> None:
     """Seeds and threads out of range are told beforehand, by every method alike."""
     with pytest.raises(InputError, match="must be a whole number from"):
         solve(instance, "greedy", **wrong)
 
 
-def test_a_target_gap_counts_from_the_best_bound_at_hand() -> None:
+def test_target_gap_uses_the_best_bound() -> None:
     """Reach alone makes one task long: the simple bounds miss it, and the run still ends at the gap asked for."""
     hard = Instance(
         ability=[1.1, 1.7, 2.3, 3.1, 4.9, 9.7], workload=[3.3, 5.9, 1.0], allowed_tasks=[[0, 1]] * 5 + [[2]]
@@ -209,13 +209,13 @@ def test_a_target_gap_counts_from_the_best_bound_at_hand() -> None:
     assert (result.makespan - plain.lower_bound) / result.makespan > 0.2
 
 
-def test_auto_says_what_it_picked(instance: Instance) -> None:
+def test_auto_names_the_method_it_picked(instance: Instance) -> None:
     """The result carries the name of the method that ran, and the reason."""
     result = solve(instance, "auto")
     assert result.method != "auto"
     assert any(f"auto picked {result.method}" in note for note in result.notes)
 
 
-def test_tells_what_the_method_notes(instance: Instance) -> None:
+def test_notes_of_the_method_are_in_the_result(instance: Instance) -> None:
     """The notes of a proposal stand in the result."""
     assert solve(instance, Answers(Proposal(Allocation([0, 1, 0]), notes=("12 messages",)))).notes == ("12 messages",)

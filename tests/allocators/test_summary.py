@@ -27,7 +27,7 @@ def test_abilities_are_rounded_up(ability, whole, text):
     assert rounded_up(ability, whole=whole) == text
 
 
-def test_ties_gain_nothing():
+def test_tied_bottlenecks_gain_nothing():
     """Tasks that are last together are named, and one more agent on one of them gains nothing."""
     lines = bottleneck_lines(solve(Instance(ability=[2, 2], workload=[2, 2]), "greedy", handle_signals=False))
     assert lines[0].startswith("Bottleneck: 2 of 2 tasks together, at 1: t1, t2")
@@ -35,13 +35,13 @@ def test_ties_gain_nothing():
     assert "100 % of the total ability is in use" in lines[2]
 
 
-def test_single_task_says_what_a_median_agent_gains():
+def test_single_task_reports_the_gain_of_a_median_agent():
     """Without a next task there is no ability that is enough; the median agent stands in."""
     lines = bottleneck_lines(solve(Instance(ability=[3], workload=[6]), "greedy", handle_signals=False))
     assert "of ability 3, the median, gains 50 %: 1." in lines[1]
 
 
-def test_finite_speeds_say_so():
+def test_finite_speeds_are_mentioned():
     """With travel times the further agent is said to be there at once."""
     instance = Instance(
         ability=[3, 1], workload=[6, 1], speed=[1, 1], agent_position=[[0, 0], [0, 1]], task_position=[[1, 0], [0, 1]]
@@ -51,7 +51,7 @@ def test_finite_speeds_say_so():
     )
 
 
-def test_one_agent_and_one_task():
+def test_singular_forms():
     """One of a kind is not told as several."""
     result = solve(Instance(name="one", ability=[3], workload=[6]), "greedy", handle_signals=False)
     assert summary(result).startswith("one (1 agent, 1 task), greedy: ")
@@ -64,7 +64,7 @@ def test_no_work_is_no_bottleneck():
     assert "optimal" in summary(result)
 
 
-def test_what_slack_leaves_open_is_not_called_settled():
+def test_slack_qualifies_the_bottleneck():
     """With slack the cheapest allocation is proven, but the same agents may well be done sooner."""
     instance = Instance(
         ability=[1, 1, 1], workload=[3, 1], task_position=[[0, 0], [9, 0]], agent_position=[[0, 0], [9, 0], [9, 0]]
@@ -87,7 +87,7 @@ def test_what_slack_leaves_open_is_not_called_settled():
         ([1, 2, 3, 50], "2 of 4 tasks cannot be served along with the others, 1 of them by no agent at all"),
     ],
 )
-def test_the_headline_says_what_nobody_can_do(sites, text):
+def test_headline_distinguishes_kinds_of_unserved_tasks(sites, text):
     """Tasks that compete for two agents are told apart from those that no agent can take."""
     instance = Instance(
         ability=[1, 1],
@@ -100,7 +100,7 @@ def test_the_headline_says_what_nobody_can_do(sites, text):
 
 
 @pytest.mark.parametrize("scenario", [1, 4])
-def test_what_is_printed_is_short(scenario: int) -> None:
+def test_summary_is_short(scenario: int) -> None:
     """A result is printed in fewer than 15 lines, whatever its size and its unserved tasks, an instance in one."""
     instance = paper(scenario, seed=1)
     lonely = Instance(ability=np.ones(40), workload=np.ones(60))

@@ -26,7 +26,7 @@ def combined_instance(number: int) -> Instance:
 
 
 @pytest.mark.parametrize("seed", range(300))
-def test_reach_and_scores_against_brute_force(seed: int) -> None:
+def test_reach_and_scores_match_brute_force(seed: int) -> None:
     """Distances, who can take what, and the energy of an allocation are those of the definitions."""
     instance = varied_instance(seed)
     distance, able = reachable(instance)
@@ -67,7 +67,7 @@ def test_exact_methods_find_the_optimum(method: str, objective: Objective) -> No
 
 @pytest.mark.parametrize("objective", OBJECTIVES)
 @pytest.mark.parametrize("method", [pytest.param(one, marks=[pytest.mark.slow] * (one == "gappo")) for one in OTHERS])
-def test_all_methods_stay_within_the_rules(method: str, objective: Objective) -> None:
+def test_all_methods_give_feasible_plans(method: str, objective: Objective) -> None:
     """Every method serves as many tasks as can be, sends nobody astray, and beats no optimum."""
     allocator = load(method)
     for number in range(len(COMBINATIONS)):

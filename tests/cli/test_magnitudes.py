@@ -99,7 +99,7 @@ SLOW = settings(
 @pytest.mark.slow
 @SLOW
 @given(documents(VALID, SIZES))
-def test_sizes_within_the_limits(alloc, document: dict[str, Any]) -> None:
+def test_magnitudes_within_the_limits(alloc, document: dict[str, Any]) -> None:
     """Any combination of valid values gives finite results in all commands, without warnings."""
     check(alloc, document, valid=True)
 
@@ -114,6 +114,6 @@ MIXED: dict[str, Any] = {
 @SLOW
 @given(documents(SIZES, SIZES))
 @example(MIXED)
-def test_sizes_beyond_the_limits(alloc, document: dict[str, Any]) -> None:
+def test_magnitudes_beyond_the_limits(alloc, document: dict[str, Any]) -> None:
     """A file with any floats is refused in one line, or handled by all commands."""
     check(alloc, document, valid=False)

@@ -29,7 +29,7 @@ def test_help_names_every_command_and_loads_no_numpy():
     assert all(f"\n  {command} " in ran.stdout for command in COMMANDS)
 
 
-def test_what_a_command_does_fits_a_line_of_the_list():
+def test_command_summaries_fit_on_a_line():
     """Summaries in the list of commands fit on a line and differ."""
     listed = python("-m", "alloc", "--help", COLUMNS="80").stdout.split("Commands:\n")[1].split("\n\n")[0]
     lines = dict(line.split(maxsplit=1) for line in listed.splitlines())
@@ -38,14 +38,14 @@ def test_what_a_command_does_fits_a_line_of_the_list():
     assert lines["export-model"] == "The same as `alloc export`."
 
 
-def test_commands_are_found():
+def test_commands_are_collected():
     """The parametrised checks cover all commands and all readers."""
     assert {"solve", "train"} < set(COMMANDS)
     assert {"solve", "compare", "convert"} < set(READERS) < set(COMMANDS)
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_each_help_has_examples(alloc, command):
+def test_every_help_has_examples(alloc, command):
     """The help of every command has valid examples."""
     ran = alloc(command, "--help")
     assert ran.code == 0
@@ -58,7 +58,7 @@ def test_each_help_has_examples(alloc, command):
 @pytest.mark.parametrize(
     "line", ["alloc sulve x.json", "alloc solve x.json --nonsense", "cat | alloc solve x --seed a"]
 )
-def test_examples_that_are_wrong_are_noticed(line):
+def test_wrong_examples_are_detected(line):
     """Examples with unknown commands, options or values are detected."""
     with pytest.raises(USAGE_ERROR):
         understand(line)
@@ -71,7 +71,7 @@ def test_every_option_is_explained(command):
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_options_that_are_not_there_are_one_line(alloc, command):
+def test_unknown_options_are_one_line(alloc, command):
     """Every command refuses unknown options in one line, and does nothing."""
     ran = alloc(command, "--nonsense")
     assert (ran.code, ran.out) == (2, "")
@@ -81,7 +81,7 @@ def test_options_that_are_not_there_are_one_line(alloc, command):
 
 
 @pytest.mark.parametrize("command", [name for name, one in COMMANDS.items() if one.params[0].required])
-def test_a_missing_argument_is_one_line(alloc, command):
+def test_missing_argument_is_one_line(alloc, command):
     """Every command that needs an argument says so in one line."""
     ran = alloc(command)
     assert (ran.code, ran.out) == (2, "")
@@ -203,7 +203,7 @@ def test_bad_usage_is_one_line(alloc, small, arguments):
         (("solve", "small.json", "--method", "ga", "--set", "hearing=3"), "--set hearing: method 'ga' takes no"),
     ],
 )
-def test_the_parameters_of_the_library_are_told_as_options(alloc, small, arguments, begin):
+def test_library_parameters_are_reported_as_options(alloc, small, arguments, begin):
     """Errors about parameters of the library name the option or argument of the command."""
     ran = alloc(*arguments)
     assert ran.code == 2
@@ -246,13 +246,13 @@ def test_set_reaches_the_method(alloc, small, monkeypatch):
     assert (given["population"], given["rate"], given["policy"]) == (50, 0.5, "p")
 
 
-def test_places_in_a_file_are_no_options(alloc):
+def test_fields_of_files_are_not_reported_as_options(alloc):
     """A field of a file with the name of an option is not reported as the option."""
     Path("bad.json").write_bytes(instance_of(b'"ability": 1').replace(b"{", b'{"tau": 2, ', 1))
     assert alloc("solve", "bad.json").err.startswith("alloc: bad.json: tau: must lie")
 
 
-def test_no_memory_is_bad_input(alloc, small, monkeypatch):
+def test_out_of_memory_is_bad_input(alloc, small, monkeypatch):
     """An instance that does not fit into memory is bad input, not a defect."""
 
     def fail(*arguments, **options):
@@ -308,7 +308,7 @@ def test_malformed_files_are_one_line_with_the_file(alloc, tmp_path, command, co
     assert ran.err.count("\n") == 1
 
 
-def test_defects_are_one_line_too(alloc, small, monkeypatch):
+def test_unexpected_exceptions_are_one_line(alloc, small, monkeypatch):
     """An unexpected exception gives one line and its own exit code, and the traceback only on request."""
 
     def fail(*arguments, **options):
@@ -326,7 +326,7 @@ def test_defects_are_one_line_too(alloc, small, monkeypatch):
 @pytest.mark.parametrize(
     ("error", "code"), [(KeyboardInterrupt(), 130), (RefusedError("too large"), 2), (OSError(28, "full"), 2)]
 )
-def test_exit_codes_of_other_ends(alloc, small, monkeypatch, error, code):
+def test_exit_codes_of_interrupts_refusals_and_disk_errors(alloc, small, monkeypatch, error, code):
     """Ctrl-C outside a run, refusals and failing disks are one line each; the latter are bad input."""
 
     def fail(*arguments, **options):
@@ -338,7 +338,7 @@ def test_exit_codes_of_other_ends(alloc, small, monkeypatch, error, code):
     assert ran.err.count("\n") == 1
 
 
-def test_names_known_without_numpy_are_those_of_the_registry():
+def test_completion_names_match_the_registry():
     """The names for completion, which does not load numpy, are those of the registry."""
     assert set(options.BUILT_IN_METHODS) == {"auto", *BUILT_IN}
     assert ENTRY_POINT_GROUP == "alloc.allocators"
@@ -367,7 +367,7 @@ def test_completion(words, count, expected):
     assert set(ran.stdout.split()) == set(expected)
 
 
-def test_a_reader_that_leaves_is_no_error(small, tmp_path):
+def test_broken_pipe_is_no_error(small, tmp_path):
     """If standard output is closed early, as by `head`, the run ends normally without messages."""
     process = subprocess.Popen(
         [sys.executable, "-m", "alloc.cli", "solve", "small.json", "--method", "greedy", "--json"],

@@ -14,7 +14,7 @@ from alloc.problems.formats import write_instance
 
 
 @pytest.mark.slow
-def test_names_of_every_script_are_drawn_without_output(tmp_path):
+def test_names_in_any_script_cause_no_output(tmp_path):
     """Missing glyphs and folders that cannot be written to cause no output, for results and fronts alike."""
     ids = ["日本語のタスク", "한국어", "हिन्दी عربي"]
     instance = Instance(
@@ -32,7 +32,7 @@ def test_names_of_every_script_are_drawn_without_output(tmp_path):
     assert all((tmp_path / picture).stat().st_size > 5_000 for picture in drawn)
 
 
-def test_plot_draws_what_solve_drew(alloc, small):
+def test_plot_matches_solve(alloc, small):
     """A stored or piped result gives the identical drawing to that of --plot."""
     ran = alloc("solve", "small.json", "--method", "greedy", "--json", "--output", "r.json", "--plot", "one.png", "-q")
     assert ran.code == 0
@@ -42,7 +42,7 @@ def test_plot_draws_what_solve_drew(alloc, small):
     assert compare_images("one.png", "three.png", 0) is None
 
 
-def test_an_allocation_is_drawn(alloc, small):
+def test_allocation_is_drawn(alloc, small):
     """An allocation alone, as another program writes it, is scored and drawn, as .pdf too."""
     document = {"format": "alloc-allocation/1", "instance": "small", "assignment": {"a1": "t1", "a4": "t2"}}
     Path("plan.json").write_text(json.dumps(document))
@@ -59,7 +59,7 @@ def test_an_allocation_is_drawn(alloc, small):
         (("small.json", "r.json", "--output", "small.json"), "small.json: is INSTANCE and --output at once"),
     ],
 )
-def test_what_cannot_be_drawn_is_one_line(alloc, small, arguments, message):
+def test_invalid_inputs_of_plot_are_one_line(alloc, small, arguments, message):
     """An instance instead of a result, an unknown suffix and clashing files give one line and exit code 2."""
     ran = alloc("plot", *arguments)
     assert (ran.code, ran.out, ran.err.count("\n")) == (2, "", 1)

@@ -69,7 +69,7 @@ def hard(tmp_path_factory: pytest.TempPathFactory) -> Path:
         ("milp", signal.SIGINT),
     ],
 )
-def test_a_signal_ends_the_run_with_the_best_so_far(hard, tmp_path, method, number):
+def test_signal_ends_the_run_with_the_incumbent(hard, tmp_path, method, number):
     """Ctrl-C or SIGTERM during a run prints and saves the best allocation at once, with the usual exit code."""
     command = ["solve", str(hard), "--method", method, "--time-limit", "60", "--json", "--output", "best.json"]
     process = subprocess.Popen(
@@ -126,7 +126,7 @@ def test_ctrl_c_while_modules_are_loaded_is_one_line(tmp_path, module):
     assert (ran.returncode, ran.stdout, ran.stderr) == (130, "", INTERRUPTED)
 
 
-def test_an_interrupt_in_a_callback_is_not_lost(monkeypatch):
+def test_interrupt_in_a_callback_is_not_lost(monkeypatch):
     """Ctrl-C in a callback from native code, which cannot propagate exceptions, is repeated."""
     monkeypatch.setattr(sys, "unraisablehook", sys.unraisablehook)
     repeat_lost_interrupts()

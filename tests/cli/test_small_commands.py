@@ -8,7 +8,7 @@ from alloc.problems import makespan_lower_bound
 from alloc.problems.formats import read_instance, to_document
 
 
-def test_validate_tells_what_is_there(alloc, small, unservable):
+def test_validate_summarises_the_instance(alloc, small, unservable):
     """A valid instance gets a summary: sizes, totals, reach, whether all tasks can be served, lower bound."""
     ran = alloc("validate", "small.json", "unservable.json", "--json")
     assert ran.code == 0
@@ -23,7 +23,7 @@ def test_validate_tells_what_is_there(alloc, small, unservable):
     assert "at least 1 of the tasks cannot be served" in ran.err
 
 
-def test_validate_goes_on_after_a_bad_file(alloc, small):
+def test_validate_continues_after_a_bad_file(alloc, small):
     """Each invalid file gets a line, and valid ones their summaries; the exit code is 2."""
     Path("bad.json").write_text("{")
     ran = alloc("validate", "bad.json", "small.json", "missing.json")
@@ -33,7 +33,7 @@ def test_validate_goes_on_after_a_bad_file(alloc, small):
 
 
 @pytest.mark.parametrize("target", ["copy.json", "copy.npz", "copy"])
-def test_convert_keeps_everything(alloc, small, target):
+def test_convert_keeps_the_instance(alloc, small, target):
     """Conversion to every format keeps the instance."""
     assert alloc("convert", "small.json", target).code == 0
     assert to_document(read_instance(target)) == to_document(small)
@@ -66,7 +66,7 @@ def test_methods_lists_all(alloc):
     assert "makespan-moves" in ran.err
 
 
-def test_methods_tells_the_parameters_of_one(alloc):
+def test_methods_lists_the_parameters_of_one(alloc):
     """`alloc methods NAME` lists its parameters with values, default and meaning, for people and as JSON."""
     ran = alloc("methods", "ga")
     assert (ran.code, ran.out) == (0, "")
@@ -78,7 +78,7 @@ def test_methods_tells_the_parameters_of_one(alloc):
     assert "did you mean 'ga'" in alloc("methods", "gaa").err
 
 
-def test_plain_is_short_for_a_parameter(alloc):
+def test_plain_sets_a_parameter(alloc):
     """`--plain` sets the parameter of milp and cpsat, which the result states; other methods say who has it."""
     alloc("generate", "random", "--agents", "6", "--tasks", "3", "--seed", "1", "--output", "six.json")
     ran = alloc("solve", "six.json", "--method", "cpsat", "--plain", "--json", "--quiet")
@@ -90,7 +90,7 @@ def test_plain_is_short_for_a_parameter(alloc):
     assert (ran.code, ran.err) == (2, "alloc: --plain: method 'ga' takes no option 'plain'; milp, cpsat do\n")
 
 
-def test_methods_names_what_is_missing(alloc, monkeypatch):
+def test_methods_names_missing_packages(alloc, monkeypatch):
     """A method with missing packages shows how to install them."""
     monkeypatch.setattr(
         "alloc.allocators.contract.method.find_spec", lambda name: None if name == "ortools" else object()
@@ -111,7 +111,7 @@ def test_methods_survives_a_broken_plugin(alloc, monkeypatch):
     assert alloc("methods").code == 0
 
 
-def test_methods_are_prepared_once_for_all(alloc, monkeypatch):
+def test_prepare_loads_and_compiles_all_methods(alloc, monkeypatch):
     """Every method and policy that is installed is loaded, what loading leaves out is compiled, and nothing is printed.
 
     A broken plugin is a note. Here everything runs in one process, where what is loaded can be seen.

@@ -147,7 +147,7 @@ def name(path):
     return path.relative_to(ROOT).as_posix() if isinstance(path, Path) else None
 
 
-def test_every_document_is_tested_or_has_nothing_to_run():
+def test_every_document_is_tested_or_has_no_code():
     """Documents that are run, parsed, or known to have no code, are all of docs/ and README."""
     tested = {name(path) for path in RUN} | {name(path) for path, _ in SHOWN}
     assert {name(path) for path in DOCUMENTS} == tested | WITHOUT_CODE
@@ -175,13 +175,13 @@ def test_document_runs(document, folder):
 
 
 @pytest.mark.parametrize(("document", "line"), SHOWN, ids=name)
-def test_what_is_not_run_is_understood(document, line):
+def test_commands_that_are_not_run_are_valid(document, line):
     """Commands that are not run have valid options and values, and scripts and targets that exist."""
     assert fault(line) is None, f"{name(document)}: {line}"
 
 
 @pytest.mark.parametrize("document", [*DOCUMENTS, *sorted((ROOT / "examples").rglob("README.md"))], ids=str)
-def test_links_lead_somewhere(document):
+def test_links_are_valid(document):
     """Every relative link of the document names a file or folder of the checkout."""
     assert broken_links(document.read_text(encoding="utf-8"), document.parent) == []
 
@@ -190,7 +190,7 @@ def broken_links(text, folder):
     return [target for target in LINK.findall(text) if ":" not in target and not (folder / target).exists()]
 
 
-def test_broken_links_are_noticed():
+def test_broken_links_are_detected():
     """Links to missing files are detected; links to files, anchors and other hosts are accepted."""
     text = "[a](absent.md) [b](test_docs.py) [c](test_docs.py#links) [d](https://example.org/absent.md)"
     assert broken_links(text, Path(__file__).parent) == ["absent.md"]
@@ -207,20 +207,20 @@ def test_broken_links_are_noticed():
         "```console\nmake nonsense\n```\n",
     ],
 )
-def test_wrong_lines_that_are_not_run_are_noticed(line):
+def test_wrong_lines_that_are_not_run_are_detected(line):
     """Unknown commands, options, scripts and targets are detected, indented or in a block that is not run."""
     (found,) = shown(f"# Title\n\n{line}\n")
     assert fault(found) is not None
 
 
-def test_wrong_python_is_noticed(folder):
+def test_wrong_python_is_detected(folder):
     """A block that raises fails its document, with the line in the document."""
     with pytest.raises(AssertionError) as caught:
         run_document("# Title\n\n```python\nx = 1\n```\n\n```python\nassert x == 2\n```\n", "wrong.md", folder)
     assert caught.traceback[-1].lineno + 1 == 8
 
 
-def test_wrong_command_is_noticed(folder):
+def test_wrong_command_is_detected(folder):
     """A failing command fails its document, also after a pipe, on a second line or after other commands."""
     for command in (
         "alloc solve absent.json",
@@ -232,7 +232,7 @@ def test_wrong_command_is_noticed(folder):
             run_document(f"```console\n$ {command}\n```\n", "wrong.md", folder)
 
 
-def test_blocks_are_left_out_for_a_reason_alone(folder):
+def test_blocks_are_skipped_only_with_a_reason(folder):
     """Only a comment with a reason, right before a block, leaves that block out."""
     wrong = "```python\nraise RuntimeError\n```\n"
     run_document(f"<!-- not run: takes an hour -->\n{wrong}", "document.md", folder)

@@ -20,7 +20,7 @@ def alaska(folder):
     return read_instance(folder / "alaska.json")
 
 
-def test_script_builds_what_is_committed(folder, tmp_path):
+def test_script_reproduces_the_committed_instance(folder, tmp_path):
     """The script reproduces the same agents and tasks; only the last digit may depend on the machine."""
     script = runpy.run_path(str(folder / "build.py"))
     script["main"].__globals__["OUTPUT"] = tmp_path / "again.json"
@@ -51,7 +51,7 @@ def test_reach_restricts(alaska):
     assert bound > makespan_lower_bound(alaska) * 1.001
 
 
-def test_search_beats_greedy_by_much(alaska):
+def test_search_is_far_better_than_greedy(alaska):
     """Largest ability first is far above the bound; a short search comes close to it."""
     greedy, better = solve(alaska, "greedy"), solve(alaska, "ga", time_limit_s=2)
     assert greedy.gap > 0.15

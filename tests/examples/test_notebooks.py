@@ -10,7 +10,7 @@ MOST_BYTES = 150_000
 
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.name)
-def test_a_notebook_is_kept_executed(path):
+def test_notebooks_are_stored_executed(path):
     """Every cell was run, in order, without an error, and the pictures are small."""
     cells = [cell for cell in json.loads(path.read_text("utf-8"))["cells"] if cell["cell_type"] == "code"]
     assert [cell["execution_count"] for cell in cells] == list(range(1, len(cells) + 1))
@@ -20,6 +20,6 @@ def test_a_notebook_is_kept_executed(path):
     assert path.stat().st_size <= MOST_BYTES
 
 
-def test_there_are_two():
+def test_there_are_two_notebooks():
     """One from own tables to a plan, one that compares methods and policies."""
     assert [path.name for path in NOTEBOOKS] == ["methods.ipynb", "own_data.ipynb"]

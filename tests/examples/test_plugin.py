@@ -56,7 +56,7 @@ def test_solves_from_the_command_line(plugin, instance_file):
     assert result["status"] == "optimal"
 
 
-def test_refuses_what_it_does_not_optimise(plugin, instance_file):
+def test_refuses_unsupported_objectives(plugin, instance_file):
     """Its `Method` names one objective; the other is refused in one line."""
     done = run(
         plugin, "alloc.cli", "solve", instance_file, "--method", "random-restart", "--objective", "makespan-energy"

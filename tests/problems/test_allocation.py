@@ -17,20 +17,20 @@ def test_ids_and_indices_are_inverse(case: tuple[Instance, Allocation]) -> None:
     assert Allocation.from_ids(instance, named) == allocation
 
 
-def test_agents_left_out_are_idle(line: Instance) -> None:
+def test_missing_agents_are_idle(line: Instance) -> None:
     """Agents that are missing or null have no task."""
     assert Allocation.from_ids(line, {"a2": "t3", "a3": None}) == Allocation([-1, 2, -1, -1])
     assert Allocation.from_ids(line, {}) == Allocation.idle(line)
 
 
 @pytest.mark.parametrize(("names", "hint"), [({"a22": "t1"}, "'a2'"), ({"a1": "t33"}, "'t3'")])
-def test_unknown_ids(line: Instance, names: dict, hint: str) -> None:
+def test_unknown_ids_are_errors(line: Instance, names: dict, hint: str) -> None:
     """An unknown name is an error with the most similar known one."""
     with pytest.raises(InputError, match=f"did you mean {hint}"):
         Allocation.from_ids(line, names)
 
 
-def test_values_not_identity() -> None:
+def test_allocations_are_compared_by_value() -> None:
     """Allocations are compared and hashed by value; the array is a read-only copy."""
     tasks = np.array([0, 1])
     one, other = Allocation(tasks), Allocation([0, 1])

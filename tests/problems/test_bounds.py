@@ -17,7 +17,7 @@ ROUNDING = 1 + 1e-9
 
 
 @given(instances(most_agents=5, most_tasks=3))
-def test_never_above_the_optimum(instance: Instance) -> None:
+def test_bounds_never_exceed_the_optimum(instance: Instance) -> None:
     """If all tasks can be served, no bound exceeds the optimum of brute force."""
     best = brute_force(instance)
     assume(not best.unserved)
@@ -29,7 +29,7 @@ def test_never_above_the_optimum(instance: Instance) -> None:
 
 
 @given(instances(most_agents=4, most_tasks=3))
-def test_energy_bound_holds_at_larger_makespans(instance: Instance) -> None:
+def test_energy_bound_never_increases_with_time(instance: Instance) -> None:
     """More time never raises the bound on the energy."""
     best = brute_force(instance)
     assume(not best.unserved)
@@ -40,7 +40,7 @@ def test_energy_bound_holds_at_larger_makespans(instance: Instance) -> None:
 
 
 @given(instances(most_agents=4, most_tasks=3))
-def test_one_more_agent_never_raises_it(instance: Instance) -> None:
+def test_bound_never_increases_with_another_agent(instance: Instance) -> None:
     """With a copy of the first agent, the bound is as large or smaller, unless there are too few agents anyway."""
     assume(instance.n >= (instance.workload > 0).sum())
     more = rebuilt(instance, np.append(np.arange(instance.n), 0), np.arange(instance.m))
@@ -58,12 +58,12 @@ def test_one_more_agent_never_raises_it(instance: Instance) -> None:
         ({"ability": [1, 2], "workload": [0, 0]}, 0.0),
     ],
 )
-def test_by_hand(fields: dict, bound: float) -> None:
+def test_every_part_of_the_bound_is_tight_somewhere(fields: dict, bound: float) -> None:
     """Each part of the bound is the largest in some instance."""
     assert makespan_lower_bound(Instance(**fields)) == pytest.approx(bound)
 
 
-def test_arrival_by_hand() -> None:
+def test_bound_by_arrival_matches_hand_calculation() -> None:
     """Ability 2 that needs 3 hours to the nearest task cannot have done 4 before hour 5."""
     instance = Instance(
         ability=[1, 1], workload=[2, 2], agent_position=[[3, 0]] * 2, task_position=[[0, 0], [0, 0]], speed=[1, 1]
@@ -73,7 +73,7 @@ def test_arrival_by_hand() -> None:
     assert makespan_lower_bound(stuck) == pytest.approx(2.0)
 
 
-def test_linear_programme_by_hand() -> None:
+def test_bound_by_linear_programme_matches_hand_calculation() -> None:
     """Tasks 1 and 2 with 6 hours of work together have only agents 1 and 2 of ability 1: 3 hours."""
     instance = Instance(ability=[1, 1, 9], workload=[2, 4, 9], allowed_tasks=[[0, 1], [0, 1], [2]])
     bound = lp_makespan_lower_bound(instance)
@@ -81,7 +81,7 @@ def test_linear_programme_by_hand() -> None:
     assert bound <= 3.0
 
 
-def test_energy_by_hand() -> None:
+def test_energy_bound_matches_hand_calculation() -> None:
     """Both tasks must be done in an hour: two agents fly 1 each at 5 a unit, one of the others stays."""
     instance = Instance(
         ability=[2, 2, 2],
@@ -95,12 +95,12 @@ def test_energy_by_hand() -> None:
 
 
 @pytest.mark.parametrize("scenario", [1, 2, 3, 4])
-def test_paper_instances_need_an_hour(scenario: int) -> None:
+def test_bound_of_paper_instances_is_an_hour(scenario: int) -> None:
     """Abilities and workloads have one sum, so that no bound lies below 1 h; and none above, as 1 h is reached."""
     assert makespan_lower_bound(paper(scenario, 0)) == pytest.approx(1.0, abs=1e-12)
 
 
-def test_a_starved_task_is_bounded_tightly() -> None:
+def test_bound_is_tight_with_one_dominant_agent() -> None:
     """If one agent has a thousand times the work of all others, tolerances of the solver do not weaken the bound."""
     lists = [[0], *[list(range(1, 31))] * 300]
     instance = Instance(ability=np.ones(301), workload=[1e4, *[1] * 30], allowed_tasks=lists)
@@ -108,7 +108,7 @@ def test_a_starved_task_is_bounded_tightly() -> None:
 
 
 @given(instances(most_agents=4, most_tasks=3), st.integers(0, 2**32))
-def test_any_multipliers_give_a_bound(instance: Instance, seed: int) -> None:
+def test_bound_is_valid_for_any_multipliers(instance: Instance, seed: int) -> None:
     """Bounds are valid even for wrong multipliers of the solver."""
     best, rng = brute_force(instance), np.random.default_rng(seed)
     assume(not best.unserved)
@@ -122,7 +122,7 @@ def test_any_multipliers_give_a_bound(instance: Instance, seed: int) -> None:
     assert energy is None or energy <= best.energy * ROUNDING
 
 
-def test_shares_of_all_magnitudes() -> None:
+def test_bound_is_valid_for_extreme_ratios() -> None:
     """Bounds are valid for extreme ratios of ability to workload."""
     instance = Instance(ability=[1e-60, 1.0], workload=[1.0, 1e-60])
     assert (lp_makespan_lower_bound(instance) or 0.0) <= 1.0 + 1e-9
@@ -130,7 +130,7 @@ def test_shares_of_all_magnitudes() -> None:
 
 
 @pytest.mark.parametrize("work", [1e-60, 3e-60, 1e-59])
-def test_steps_that_no_longer_move_end(work: float) -> None:
+def test_smallest_workloads_have_a_valid_bound(work: float) -> None:
     """The smallest representable workloads have a valid bound, too."""
     instance = Instance(ability=[1, 2, 3, 4], workload=[work, work * 3, 0])
     assert makespan_lower_bound(instance) <= brute_force(instance).makespan

@@ -22,7 +22,7 @@ def test_spread_and_tally_are_inverse(case: tuple[Instance, Allocation]) -> None
 
 
 @given(instances())
-def test_members_are_alike(instance: Instance) -> None:
+def test_members_of_a_class_are_identical(instance: Instance) -> None:
     """A class has the ability, speed, tasks and, by place, distances of each of its members."""
     for by_place in (False, True):
         classes = agent_classes(instance, by_place=by_place)
@@ -35,7 +35,7 @@ def test_members_are_alike(instance: Instance) -> None:
             assert (classes.distance[kind] == instance.reach.distance[instance.reach.origin]).all()
 
 
-def test_counts_by_hand() -> None:
+def test_class_counts_match_hand_calculation() -> None:
     """Three abilities at two places: three classes, four by place; travel times tell places apart as well."""
     fields = {
         "ability": [1, 2, 2, 3, 2],
@@ -49,7 +49,7 @@ def test_counts_by_hand() -> None:
     assert agent_classes(Instance(**fields, speed=[1] * 5), by_place=False).size == 4
 
 
-def test_too_many_agents() -> None:
+def test_more_agents_than_a_class_has_are_refused() -> None:
     """More agents than a class has cannot be spread."""
     classes = agent_classes(Instance(ability=[1, 1], workload=[1]), by_place=False)
     with pytest.raises(ValueError, match="more agents"):

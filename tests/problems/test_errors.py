@@ -13,7 +13,7 @@ def test_nearest_name_is_offered() -> None:
     assert nearest("A", ["a", "A1"]) == " (did you mean 'A1'?)"
 
 
-def test_long_lists_are_cut() -> None:
+def test_long_lists_are_truncated() -> None:
     """Of thousands of names, ten are listed, with the number of the others."""
     ids = [f"agent-{number}" for number in range(5000)]
     assert nearest("xyz", ids) == f" (known: {', '.join(ids[:10])} and 4990 more)"

@@ -23,7 +23,7 @@ from alloc.problems.evaluation import completion_time
 NAN = float("nan")
 
 
-def test_by_hand(line: Instance) -> None:
+def test_scores_match_hand_calculation(line: Instance) -> None:
     """Agents of 2 and 1 do 6 in 2 h at no distance; that of 4, on its own task, does 4 in 1 h; the rest is idle."""
     score = evaluate(line, Allocation([0, 0, 1, -1]))
     assert score.completion_time.tolist() == [2.0, 1.0, 0.0]
@@ -35,7 +35,7 @@ def test_by_hand(line: Instance) -> None:
     assert not score.reward_saturated
 
 
-def test_flights_by_hand(line: Instance) -> None:
+def test_flights_match_hand_calculation(line: Instance) -> None:
     """Distances 3 (agent 1), 3 (agent 3, from task 2 back to task 1), 0 (agent 4, whose place is unknown)."""
     score = evaluate(line, Allocation([1, -1, 0, 0]))
     assert score.distance == pytest.approx(6.0)
@@ -45,7 +45,7 @@ def test_flights_by_hand(line: Instance) -> None:
     assert score.completion_time.tolist() == pytest.approx([6 / 7, 2.0, 0.0])
 
 
-def test_violations_by_hand(line: Instance) -> None:
+def test_violations_match_hand_calculation(line: Instance) -> None:
     """Agent 2 has 5 units for a flight of 3 at 2 each: neither its ability nor its flight counts."""
     score = evaluate(line, Allocation([0, 1, -1, -1]))
     assert [(v.agent, v.task) for v in score.violations] == [(1, 1)]
@@ -72,7 +72,7 @@ def test_reasons_of_violations(limits: dict, reason: str) -> None:
     assert not evaluate(instance, Allocation([1])).violations
 
 
-def test_finite_speeds_by_hand() -> None:
+def test_finite_speeds_match_hand_calculation() -> None:
     """2 per hour from the start and 3 per hour from hour 2 do 10 by hour 3.2; who comes after that adds nothing."""
     instance = Instance(
         ability=[2, 3, 50],
@@ -87,14 +87,14 @@ def test_finite_speeds_by_hand() -> None:
 
 
 @given(st.lists(st.tuples(st.floats(0.1, 9), st.floats(0, 9)), min_size=1, max_size=6), st.floats(0.1, 50))
-def test_completion_time_is_the_root(group: list[tuple[float, float]], workload: float) -> None:
+def test_work_done_by_the_completion_time_is_the_workload(group: list[tuple[float, float]], workload: float) -> None:
     """At the hour that is returned, the work done by all who have arrived is the workload."""
     ability, arrival = np.array(group).T
     hour = completion_time(workload, ability, arrival)
     assert (ability * np.maximum(0.0, hour - arrival)).sum() == pytest.approx(workload, rel=1e-9)
 
 
-def test_no_work_at_all() -> None:
+def test_no_workload() -> None:
     """Without workload the makespan is 0, nobody is needed, and nothing is unserved."""
     score = evaluate(Instance(ability=[1], workload=[0, 0]), Allocation([-1]))
     assert (score.makespan, score.unserved_tasks, score.battery_remaining_percent) == (0.0, (), None)
@@ -109,12 +109,12 @@ def test_reward_saturates() -> None:
     assert sum_only.reward_saturated
 
 
-def test_a_large_surplus_gives_no_reward_but_no_warning() -> None:
+def test_large_surplus_gives_zero_reward_without_warning() -> None:
     """tau to a large power is 0."""
     assert evaluate(Instance(ability=[1e6], workload=[1]), Allocation([0])).reward == 0.0
 
 
-def test_served_tasks_are_never_called_unserved() -> None:
+def test_served_tasks_have_finite_completion_times() -> None:
     """Completion times of served tasks are finite for all valid abilities and speeds."""
     slow = Instance(ability=[1e-60], workload=[1e60])
     assert evaluate(slow, Allocation([0])).makespan == pytest.approx(1e120)
@@ -123,13 +123,13 @@ def test_served_tasks_are_never_called_unserved() -> None:
 
 
 @pytest.mark.parametrize("tasks", [[0], [0, 0, 0], [0, 3], [-2, 0]])
-def test_wrong_shapes_and_indices(tasks: list[int]) -> None:
+def test_wrong_shapes_and_indices_are_errors(tasks: list[int]) -> None:
     """A wrong number of agents, or an invalid task, is an error."""
     with pytest.raises(InputError):
         evaluate(Instance(ability=[1, 1], workload=[1, 1, 1]), Allocation(tasks))
 
 
-def test_order_of_better() -> None:
+def test_comparison_is_lexicographic() -> None:
     """Unserved tasks take precedence over makespan, and makespan over energy; differences of 1e-9 are ties."""
     instance = Instance(
         ability=[2, 2, 1],
@@ -149,7 +149,7 @@ def test_order_of_better() -> None:
 
 
 @given(allocated(), st.randoms(use_true_random=False))
-def test_relabelling_changes_nothing(case: tuple[Instance, Allocation], random: object) -> None:
+def test_scores_are_permutation_invariant(case: tuple[Instance, Allocation], random: object) -> None:
     """Agents and tasks in another order have the same scores."""
     instance, allocation = case
     rng = np.random.default_rng(random.getrandbits(32))
@@ -173,7 +173,7 @@ def test_scaling_workloads_scales_times(case: tuple[Instance, Allocation], scale
 
 
 @given(instances(most_agents=4, most_tasks=3))
-def test_agrees_with_the_definitions(instance: Instance) -> None:
+def test_scores_match_brute_force(instance: Instance) -> None:
     """The plan that brute force finds from the definitions alone scores what brute force says."""
     best = brute_force(instance)
     score = evaluate(instance, Allocation(best.plan))

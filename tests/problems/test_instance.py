@@ -8,7 +8,7 @@ from alloc.problems import InputError, Instance
 NAN, INF = float("nan"), float("inf")
 
 
-def test_defaults() -> None:
+def test_defaults_are_unlimited_or_unknown() -> None:
     """Ability and workload are enough; all else is unlimited or unknown."""
     instance = Instance(ability=[1, 2], workload=[3])
     assert (instance.n, instance.m, instance.agent_ids, instance.task_ids) == (2, 1, ("a1", "a2"), ("t1",))
@@ -55,7 +55,7 @@ def test_defaults() -> None:
         ({"task_position": [[0, 0], [0, -1.7e308]]}, "tasks[1].position"),
     ],
 )
-def test_errors_name_the_place(fields: dict, place: str) -> None:
+def test_invalid_values_are_located(fields: dict, place: str) -> None:
     """Invalid values are refused with their place in the data."""
     with pytest.raises(InputError) as caught:
         Instance(**{"ability": [1, 1], "workload": [1, 1], **fields})
@@ -71,7 +71,7 @@ def test_errors_name_the_place(fields: dict, place: str) -> None:
         ({"bases": {"north": (1,)}}, r"bases\[0\].position: must be 2 or 3 numbers"),
     ],
 )
-def test_bases_that_are_none_are_refused(fields: dict, message: str) -> None:
+def test_invalid_bases_are_refused(fields: dict, message: str) -> None:
     """Unknown bases, contradictions with `returns`, and names and places that files cannot store are refused."""
     with pytest.raises(InputError, match=message):
         Instance(**{"ability": [1], "workload": [1], "bases": {"north": (0, 1)}, **fields})
@@ -85,7 +85,7 @@ def test_ids_are_unique(kind: str) -> None:
             Instance(ability=[1, 1], workload=[1, 1], **{kind: ids})
 
 
-def test_start_position() -> None:
+def test_position_takes_precedence_over_start_task() -> None:
     """A position takes precedence over a start task; 2-D positions have z = 0."""
     instance = Instance(
         ability=[1, 1, 1],
@@ -98,7 +98,7 @@ def test_start_position() -> None:
     assert np.isnan(instance.start_position[2]).all()
 
 
-def test_allowed_tasks() -> None:
+def test_allowed_tasks_are_sorted_and_unique() -> None:
     """Lists are sorted and unique; None differs from an empty list."""
     lists = [(2, 0, 2), None, [], np.array([1]), {1, 0}]
     instance = Instance(ability=np.ones(5), workload=[1, 1, 1], allowed_tasks=lists)
@@ -119,7 +119,7 @@ def test_allowed_tasks() -> None:
     ]
 
 
-def test_without_agents() -> None:
+def test_removing_agents_keeps_all_fields() -> None:
     """The remaining agents keep all fields, and tasks are unchanged."""
     instance = Instance(
         ability=[1, 2, 3],
@@ -142,7 +142,7 @@ def test_without_agents() -> None:
         instance.without_agents(instance.agent_ids)
 
 
-def test_read_only_and_independent() -> None:
+def test_arrays_are_read_only_copies() -> None:
     """Given arrays can be changed afterwards without effect; arrays of the instance are read-only."""
     given = np.array([1.0, 2.0])
     instance = Instance(ability=given, workload=[1])

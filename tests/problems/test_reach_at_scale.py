@@ -76,7 +76,7 @@ def test_pairs_agree_with_the_table(instance: Instance, factor: float) -> None:
 
 
 @given(instances(), FACTORS, st.sampled_from([1, 4, 1 << 20]))
-def test_neighbours_are_the_rows_of_the_table(instance: Instance, factor: float, chunk: int) -> None:
+def test_neighbours_match_the_table(instance: Instance, factor: float, chunk: int) -> None:
     """Gathered by trees, in chunks of any size, they are what the table holds; the nearest is the least of a row."""
     instance = stretched(instance, factor)
     table = instance.reach
@@ -94,7 +94,7 @@ def test_neighbours_are_the_rows_of_the_table(instance: Instance, factor: float,
 
 
 @given(allocated(), st.sampled_from([0, 50_000_000]))
-def test_same_scores_bounds_and_matchings(case: tuple[Instance, Allocation], many: int) -> None:
+def test_scores_bounds_and_matchings_match_the_table(case: tuple[Instance, Allocation], many: int) -> None:
     """Scores, bounds and how many tasks can be served do not depend on how reach is looked at, to the last bit.
 
     Abilities are made such that sums of them are exact, as each way of looking sums them up in another order.

@@ -15,12 +15,12 @@ from alloc.problems.text import heading, labelled, number, short_names
         (["same name twice", "same name twice"], ["same name…", "same name…"]),
     ],
 )
-def test_names_are_cut_where_they_stay_different(names: list[str], short: list[str]) -> None:
+def test_shortened_names_remain_distinct(names: list[str], short: list[str]) -> None:
     """At the end, or in the middle where the ends would be equal; equal names stay equal."""
     assert short_names(names, 10) == short
 
 
-def test_names_that_differ_nowhere_else_are_numbered() -> None:
+def test_names_that_differ_only_in_the_middle_are_numbered() -> None:
     """Names that differ at neither end get numbers, within the length limit."""
     names = [f"{'x' * 30}{letter}{'x' * 30}" for letter in "abc"]
     short = short_names(names, 10)
@@ -28,7 +28,7 @@ def test_names_that_differ_nowhere_else_are_numbered() -> None:
     assert all(len(name) <= 10 for name in short)
 
 
-def test_units_are_left_out_where_there_are_none() -> None:
+def test_missing_units_are_left_out() -> None:
     """A number or a heading alone, or with the unit."""
     assert (labelled("1", ""), labelled("1", "h")) == ("1", "1 h")
     assert (heading("finish", ""), heading("finish", "h")) == ("finish", "finish (h)")
@@ -38,6 +38,6 @@ def test_units_are_left_out_where_there_are_none() -> None:
     ("value", "text"),
     [(1714.2, "1714"), (-12345.6, "-12346"), (0.0012345, "0.00123"), (12.345, "12.3"), (2.5e7, "2.5e+07"), (None, "-")],
 )
-def test_numbers_are_read_without_an_exponent(value: float | None, text: str) -> None:
+def test_numbers_are_written_without_an_exponent(value: float | None, text: str) -> None:
     """Numbers up to ten million have no exponent; larger ones do."""
     assert number(value, 3) == text

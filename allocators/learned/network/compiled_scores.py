@@ -2,7 +2,7 @@
 
 The features are those of `problems.game.observation.pair_features` in single precision. The formulas stand twice, as
 torch works on all pairs at once, and a loop on the pairs that have changed, with no array in between.
-`test_compiled_games_are_those_of_torch` holds both to the same games.
+`test_compiled_games_match_torch` holds both to the same games.
 numba before 0.68 takes the value of an IntEnum as an index, not its member.
 """
 

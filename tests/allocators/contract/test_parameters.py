@@ -44,7 +44,7 @@ def test_defaults_of_a_class_with_slots():
     assert Sized(size=4).changed_parameters() == {"size": 4}
 
 
-def test_values_become_pythons_own():
+def test_values_are_converted_to_python_types():
     """Numpy's scalars, integers for floats and lists for tuples are converted."""
     settings = {"size": np.int64(2), "rate": 1, "radius": np.float32(2), "steps": [1, np.float64(2)], "fast": np.True_}
     found = with_settings(Sample, None, settings)
@@ -62,7 +62,7 @@ def test_values_become_pythons_own():
         ("steps", (1, -1)), ("steps", 1), ("fast", 1), ("name", 3),
     ],
 )  # fmt: skip
-def test_wrong_values_are_named(name, value):
+def test_wrong_values_are_errors_that_name_the_parameter(name, value):
     """A value of the wrong type or out of range is an error that names the parameter, however it is set."""
     with pytest.raises(InputError) as caught:
         with_settings(Sample, None, {name: value})
@@ -79,7 +79,7 @@ def test_unknown_names_get_a_hint():
     assert caught.value.place == "sise"
 
 
-def test_parameters_of_another_method():
+def test_parameters_of_another_method_are_refused():
     """Parameters of another type are refused."""
     with pytest.raises(InputError, match="parameters"):
         with_settings(Sample, "fast", {})  # type: ignore[type-var]

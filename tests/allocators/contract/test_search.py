@@ -21,7 +21,7 @@ def search(instance: Instance, objective: Objective = Objective.MAKESPAN, **limi
 
 
 @pytest.mark.parametrize("field", ["time_limit_s", "iterations", "target_gap"])
-def test_budgets_are_not_negative(field: str) -> None:
+def test_negative_budgets_are_refused(field: str) -> None:
     """Neither negative nor NaN nor infinite; nothing at all is allowed, and so is no limit."""
     for wrong in (-1, float("nan"), float("inf")):
         with pytest.raises(InputError):
@@ -30,7 +30,7 @@ def test_budgets_are_not_negative(field: str) -> None:
     Budget(**{field: None})
 
 
-def test_keeps_the_best(instance: Instance) -> None:
+def test_best_plan_is_kept(instance: Instance) -> None:
     """What is better replaces what was best, is traced and told; what is not, is scored only."""
     told: list[Improvement] = []
     run = Search(instance, Objective.MAKESPAN, Budget(None), on_improvement=told.append)
@@ -44,7 +44,7 @@ def test_keeps_the_best(instance: Instance) -> None:
     assert run.gap == 0.0
 
 
-def test_reasons_to_stop(instance: Instance) -> None:
+def test_stop_reasons(instance: Instance) -> None:
     """Each limit ends a run for its own reason, and a run without limits goes on until it is proven."""
     assert search(instance).stop_reason() is None
     assert search(instance, time_limit_s=0).stop_reason() is StopReason.TIME_LIMIT
@@ -61,7 +61,7 @@ def test_reasons_to_stop(instance: Instance) -> None:
     assert proven.should_stop()
 
 
-def test_energy_keeps_a_run_going(instance: Instance) -> None:
+def test_run_continues_while_energy_may_fall(instance: Instance) -> None:
     """At the least makespan, energy may still fall, unless it is 0."""
     run = search(instance, Objective.MAKESPAN_ENERGY)
     run.submit(Allocation([0, 1, 0]))
@@ -71,7 +71,7 @@ def test_energy_keeps_a_run_going(instance: Instance) -> None:
     assert still.stop_reason() is StopReason.PROVEN
 
 
-def test_clock_and_interruption(instance: Instance) -> None:
+def test_clock_starts_with_the_run_and_an_event_ends_it(instance: Instance) -> None:
     """The clock starts with the run; an event from outside ends it at once."""
     stop = threading.Event()
     run = Search(instance, Objective.MAKESPAN, Budget(60), stop=stop)
@@ -84,7 +84,7 @@ def test_clock_and_interruption(instance: Instance) -> None:
     assert run.stop_reason() is StopReason.INTERRUPTED
 
 
-def test_bounds_only_rise(instance: Instance) -> None:
+def test_bounds_never_decrease(instance: Instance) -> None:
     """A weaker bound changes nothing, and an unserved task leaves the gap at 1."""
     run = search(instance)
     run.raise_bound(0.5)
@@ -95,7 +95,7 @@ def test_bounds_only_rise(instance: Instance) -> None:
     assert run.gap == 1.0
 
 
-def test_starts_are_submitted(instance: Instance) -> None:
+def test_warm_start_is_the_first_incumbent(instance: Instance) -> None:
     """A warm start is the first best."""
     start = Allocation([0, 1, 0])
     run = Search(instance, Objective.MAKESPAN, Budget(), start=start)
@@ -103,7 +103,7 @@ def test_starts_are_submitted(instance: Instance) -> None:
     assert run.best.allocation == start
 
 
-def test_slack_lets_energy_decide(instance: Instance) -> None:
+def test_cheapest_plan_within_slack_is_best(instance: Instance) -> None:
     """Within the slack the cheapest is the best, whatever comes later and is faster."""
     run = Search(instance, Objective.MAKESPAN_ENERGY, Budget(None), tolerance=MakespanTolerance(slack=0.4))
     slow, middle, fast = Allocation([0, 1, -1]), Allocation([0, 0, 1]), Allocation([0, 1, 0])
@@ -116,7 +116,7 @@ def test_slack_lets_energy_decide(instance: Instance) -> None:
     assert run.makespan_limit == pytest.approx(1.4)
 
 
-def test_a_find_comes_back_when_the_fastest_gets_faster() -> None:
+def test_second_best_returns_when_the_cheapest_leaves_the_slack() -> None:
     """The cheapest leaves the slack; the one that was second then is the best, not merely the fastest."""
     instance = Instance(ability=[4, 2, 1], workload=[4], task_position=[[3, 0]], agent_position=[[0, 0]] * 2 + [[2, 0]])
     run = Search(instance, Objective.MAKESPAN_ENERGY, Budget(None), tolerance=MakespanTolerance(slack=0.5))
@@ -128,7 +128,7 @@ def test_a_find_comes_back_when_the_fastest_gets_faster() -> None:
     assert times == sorted(times)
 
 
-def test_a_limit_makes_all_in_time_equal(instance: Instance) -> None:
+def test_below_the_makespan_limit_energy_decides(instance: Instance) -> None:
     """Up to the limit energy alone counts; beyond it, the makespan still does."""
     run = Search(instance, Objective.MAKESPAN_ENERGY, Budget(None), tolerance=MakespanTolerance(limit=1.5))
     far, cheap = Allocation([1, 0, 0]), Allocation([0, 1, -1])
@@ -141,13 +141,13 @@ def test_a_limit_makes_all_in_time_equal(instance: Instance) -> None:
 
 
 @pytest.mark.parametrize("wrong", [{"slack": -0.1}, {"slack": float("nan")}, {"limit": 0.0}, {"limit": float("inf")}])
-def test_deadlines_are_checked(wrong: dict[str, float]) -> None:
+def test_slack_and_limit_are_validated(wrong: dict[str, float]) -> None:
     """Slack is finite and not negative, a limit finite and positive."""
     with pytest.raises(InputError):
         MakespanTolerance(**wrong)
 
 
-def test_a_stage_that_fails_costs_no_plan(instance: Instance, caplog: pytest.LogCaptureFixture) -> None:
+def test_failing_stage_keeps_the_incumbent(instance: Instance, caplog: pytest.LogCaptureFixture) -> None:
     """With a plan at hand, its exception is logged and noted; without one it is raised."""
     run = Search(instance, Objective.MAKESPAN, Budget())
     with pytest.raises(ZeroDivisionError), run.improving("polishing"):
@@ -159,7 +159,7 @@ def test_a_stage_that_fails_costs_no_plan(instance: Instance, caplog: pytest.Log
     assert [record.name for record in caplog.records] == ["alloc"]
 
 
-def test_what_a_callback_raises_passes_every_stage(instance: Instance) -> None:
+def test_callback_exceptions_propagate_through_every_stage(instance: Instance) -> None:
     """It ends the run, though it is raised where failures are met."""
 
     def enough(_: object) -> None:

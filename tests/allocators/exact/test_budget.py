@@ -33,7 +33,7 @@ def exact(request: pytest.FixtureRequest) -> Allocator:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("objective", ["makespan", "makespan-energy"])
-def test_time_limit_is_held_in_both_stages(exact, objective):
+def test_time_limit_is_respected_in_both_stages(exact, objective):
     """A run of one second ends in time with a plan and a bound, and the energy stage gets its share."""
 
     def run():
@@ -83,7 +83,7 @@ for _ in range(2):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("method", ["cpsat", "milp"])
-def test_signals_end_runs_but_not_the_process(method):
+def test_signals_end_the_run_but_not_the_process(method):
     """After either signal, the best plan is returned soon, and the process continues and exits with status 0."""
     code = PROGRAMME.format(folder=__file__.rpartition("/")[0], method=method)
     with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True) as process:
@@ -98,7 +98,7 @@ def test_signals_end_runs_but_not_the_process(method):
         assert process.wait(timeout=10) == 0
 
 
-def test_iterations_count_models_and_repeat(exact):
+def test_iteration_budget_is_reproducible(exact):
     """With a budget of iterations alone, the same seed gives the same answer after the same number of models."""
     instance = hard(14, 4)
     runs = [solve(instance, exact, time_limit_s=None, iterations=3, seed=5) for _ in range(2)]
@@ -107,21 +107,21 @@ def test_iterations_count_models_and_repeat(exact):
     assert [step.makespan for step in runs[0].trace] == [step.makespan for step in runs[1].trace]
 
 
-def test_no_iterations_still_give_a_plan(exact):
+def test_zero_iterations_still_give_a_plan(exact):
     """Even if the solver may not be called at all, every task is served."""
     result = solve(paper(1, 0), exact, time_limit_s=None, iterations=0)
     assert result.makespan is not None
     assert result.stop_reason is StopReason.ITERATIONS
 
 
-def test_no_time_still_gives_a_plan(exact):
+def test_zero_time_still_gives_a_plan(exact):
     """With a time limit of zero, every task is served at once."""
     result = solve(paper(1, 0), exact, time_limit_s=0)
     assert result.makespan is not None
     assert result.runtime_s < OVERHEAD_S
 
 
-def test_a_warm_start_is_used(exact):
+def test_warm_start_is_used(exact):
     """An optimal start is kept and proven."""
     best = solve(paper(1, 0), exact)
     again = solve(paper(1, 0), exact, start=best.allocation, objective="makespan")
@@ -137,7 +137,7 @@ def test_target_gap_ends_the_run(exact):
     assert result.gap <= 0.05
 
 
-def test_error_of_a_callback_reaches_the_caller(exact):
+def test_callback_exceptions_reach_the_caller(exact):
     """Exceptions of `on_improvement` propagate through `solve`, even while a solver runs."""
 
     def refuse_energy(improvement):

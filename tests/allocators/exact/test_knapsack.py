@@ -35,7 +35,7 @@ def by_trying(weight, price, copies, need, enough):
 
 
 @given(classes, st.integers(0, 12), st.one_of(st.just(-1), st.integers(0, 6)))
-def test_cheapest_group_is_that_of_brute_force(rows, need, spare):
+def test_cheapest_group_matches_brute_force(rows, need, spare):
     """Cost and group are right for prices of either sign, with and without a limit on the sum."""
     weight, price, copies = arrays(rows)
     enough = need + spare if spare >= 0 else -1
@@ -63,7 +63,7 @@ def test_one_table_answers_for_every_need(exact):
         assert group @ weight >= need
 
 
-def test_weights_beyond_the_need_count_as_the_need():
+def test_weights_are_capped_at_the_need():
     """An agent that alone exceeds the need meets it, but meets no smaller sum exactly."""
     weight, price, copies = np.array([50, 2]), np.array([1.0, 0.4]), np.array([1, 9])
     assert cheapest_group(weight, price, copies, 10, -1)[0] == 1.0
@@ -80,7 +80,7 @@ def test_infeasible_needs_cost_infinity():
 
 
 @given(st.integers(0, 2**32), st.integers(0, 3), st.integers(1, 90))
-def test_core_has_the_cheapest_group(seed, spare, classes):
+def test_core_contains_the_cheapest_group(seed, spare, classes):
     """Optimising only the core loses nothing, for prices of either sign."""
     rng = np.random.default_rng(seed)
     weight, copies = rng.integers(1, 11, classes), rng.integers(1, 4, classes)
@@ -96,7 +96,7 @@ def test_core_has_the_cheapest_group(seed, spare, classes):
 
 @settings(max_examples=20)
 @given(st.integers(0, 2**32), st.integers(1, 60), st.sampled_from([1, 2**30]))
-def test_states_have_the_cheapest_group(seed, classes, scale):
+def test_state_lists_find_the_cheapest_group(seed, classes, scale):
     """Lists of states agree with the table, also for numbers far beyond any table."""
     rng = np.random.default_rng(seed)
     weight, copies = rng.integers(1, 40, classes), rng.integers(1, 4, classes)
@@ -112,7 +112,7 @@ def test_states_have_the_cheapest_group(seed, classes, scale):
 
 
 @given(st.integers(0, 2**32), st.integers(2, 6), st.sampled_from([0.0, CHEAPER]))
-def test_with_too_few_states_the_cost_is_a_bound(seed, size, cheaper):
+def test_cost_is_a_bound_with_too_few_states(seed, size, cheaper):
     """If states do not fit, no group is cheaper than the returned cost, and the returned group meets the need."""
     rng = np.random.default_rng(seed)
     weight, price, copies = rng.integers(5, 40, 30), rng.integers(1, 500, 30).astype(float), np.ones(30, dtype=np.int64)
@@ -128,7 +128,7 @@ float_classes = st.lists(
 
 
 @given(float_classes, st.integers(1, 160))
-def test_states_of_reals_have_the_cheapest_group(rows, need):
+def test_state_lists_of_reals_find_the_cheapest_group(rows, need):
     """With non-integer weights, cost, group and bounds on the excess agree with brute force."""
     whole, price, copies, factor = (np.array(column) for column in zip(*rows, strict=True))
     weight, price, copies, need = whole * factor / 40, price / 20, copies.astype(np.int64), need / 40

@@ -24,7 +24,7 @@ def meets(demand: Demand, counts: np.ndarray) -> bool:
 
 
 @pytest.mark.parametrize("seed", SERVED)
-def test_the_optimum_meets_the_demand_at_its_makespan_and_not_before(seed):
+def test_plan_meets_the_demand_from_its_makespan_on(seed):
     """A plan meets the demand at T if and only if its makespan by the evaluator is at most T."""
     instance = tiny_instance(seed)
     plan = Allocation(brute_force(instance).plan)
@@ -54,7 +54,7 @@ def test_rounding_keeps_every_plan(seed):
     ("ability", "unit"),
     [([2, 4, 6], 2.0), ([0.5, 1.25], 0.25), ([0.1, 0.2, 0.3], 0.1), ([1, np.pi], None), ([1e9, 1e9 + 0.001], None)],
 )
-def test_unit_of_abilities_is_found(ability, unit):
+def test_common_unit_of_abilities_is_found(ability, unit):
     """Integers and short decimals have a common unit; other numbers, and those with too many digits, have none."""
     found = model_of(Instance(ability=ability, workload=[1])).unit
     assert found is None if unit is None else found == pytest.approx(unit, rel=1e-12)
@@ -79,7 +79,7 @@ def test_travel_reduces_the_weight():
     assert sorted(model_of(instance).at(4.0).weight.tolist()) == [0.5, 1.0]
 
 
-def test_without_spare_ability_all_agents_work():
+def test_all_agents_work_if_no_ability_is_spare():
     """If the demand takes all ability, all agents must work, and no task may get more than its need."""
     demand = model_of(Instance(ability=[1, 1, 2], workload=[2, 2])).at(1.0)
     assert demand.spare == 0
@@ -87,7 +87,7 @@ def test_without_spare_ability_all_agents_work():
     assert demand.min_agents.tolist() == demand.count.tolist()
 
 
-def test_agents_that_reach_nothing_are_not_counted():
+def test_agents_without_reachable_tasks_are_not_counted():
     """The strongest agent may take no task: it counts neither as ability nor as an agent that must work."""
     demand = model_of(Instance(ability=[5, 1, 1], workload=[1, 1], allowed_tasks=[[], None, None])).at(1.0)
     assert demand.spare == 0

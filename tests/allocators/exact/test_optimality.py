@@ -27,7 +27,7 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
         metafunc.parametrize(("seed", "objective"), cases)
 
 
-def test_answer_is_that_of_brute_force(exact, seed, objective):
+def test_optimum_matches_brute_force(exact, seed, objective):
     """On tiny instances of every kind, the answer is optimal, or the best partial plan, and proven."""
     instance = tiny_instance(seed)
     best = brute_force(instance)
@@ -100,7 +100,7 @@ def test_units_do_not_matter(exact, scale):
     assert other.makespan == pytest.approx(plain.makespan * scale, rel=1e-8)
 
 
-def test_contest_is_explained(exact):
+def test_shortage_is_explained(exact):
     """With one agent for three tasks, two of them, already one too many, are named in plain words."""
     instance = Instance(ability=[1, 1], workload=[1, 1, 1, 1], allowed_tasks=[[0, 1, 2], [3]])
     result = solve(instance, exact)

@@ -15,7 +15,7 @@ from alloc.problems.models.programme import build_programme
 
 @pytest.mark.parametrize("name", ["milp", "cpsat"])
 @pytest.mark.parametrize("seed", range(6))
-def test_answer_is_that_of_brute_force(name, seed):
+def test_optimum_matches_brute_force(name, seed):
     """The solver alone proves the least makespan, then the least energy at it, for any abilities."""
     instance = tiny_instance(seed)
     if instance.has_travel_time:
@@ -57,6 +57,6 @@ def test_instances_without_a_plain_model_are_refused():
         solve(wide, Milp(plain=True))
 
 
-def test_no_work_is_done_at_once():
+def test_instance_without_work_has_the_idle_plan():
     """An instance without work has the idle plan."""
     assert solve(Instance(ability=[1.0], workload=[0.0]), Milp(plain=True)).makespan == 0

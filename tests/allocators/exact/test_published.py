@@ -21,7 +21,7 @@ def rows() -> list[dict[str, str]]:
     return found
 
 
-def test_every_plan_has_the_published_makespan_and_no_bound_is_above_it() -> None:
+def test_plans_reach_published_makespans_and_bounds_do_not_exceed_them() -> None:
     """Evaluated again, every plan serves all tasks in the published time, not below the published and simple bounds."""
     for row in rows():
         shape = (int(row[name]) for name in ("agents", "tasks", "low", "high", "seed"))
@@ -39,7 +39,7 @@ def test_every_plan_has_the_published_makespan_and_no_bound_is_above_it() -> Non
         assert (row["status"] == "optimal") == (score.makespan - bound <= 1e-6 * score.makespan)
 
 
-def test_least_loads_are_those_of_the_makespans() -> None:
+def test_least_loads_match_the_makespans() -> None:
     """With equal workloads, the optimum's least load is an integer, and so is the bound on it, the same number."""
     for row in rows():
         if row["workloads"] == "equal":

@@ -30,7 +30,7 @@ SERVED = [seed for seed in range(40) if fewest_unserved(scaled_instance(seed)) =
 @pytest.mark.parametrize(
     "seed", [pytest.param(one, marks=[pytest.mark.slow] * (k >= 6)) for k, one in enumerate(SERVED[:20])]
 )
-def test_optima_and_bounds_are_those_of_brute_force(seed, method):
+def test_optima_and_bounds_match_brute_force(seed, method):
     """Plans reported as optimal are optimal, and no bound exceeds the value of a plan."""
     instance = scaled_instance(seed)
     result = solve(instance, method, objective="makespan-energy", time_limit_s=60)
@@ -43,7 +43,7 @@ def test_optima_and_bounds_are_those_of_brute_force(seed, method):
 
 
 @pytest.mark.parametrize("seed", SERVED)
-def test_bounds_without_a_solver_for_integers_hold(seed):
+def test_bounds_without_integer_solver_are_valid(seed):
     """No bound of the linear programmes, nor of the sums, exceeds the best plan's value."""
     instance = scaled_instance(seed)
     best = brute_force(instance)
@@ -55,7 +55,7 @@ def test_bounds_without_a_solver_for_integers_hold(seed):
 
 @pytest.mark.parametrize("method", ["milp", "cpsat", "auto"])
 @pytest.mark.parametrize("unit", [1e-9, 1e-7, 1.0, 1e9])
-def test_least_energy_by_hand(method, unit):
+def test_least_energy_matches_hand_calculation(method, unit):
     """The least energy is four units of distance, not five, however small the unit."""
     instance = Instance(
         ability=[2, 1, 3],
@@ -116,7 +116,7 @@ def energy_model(cost: np.ndarray, hint: np.ndarray | None) -> SolverModel:
 
 @pytest.mark.parametrize("unit", [1e-280, 1e-9, 1e-3, 1.0, 1e9, 1e280])
 @pytest.mark.parametrize("dear", [1.0, 1e9])
-def test_costs_come_to_solvers_at_about_one(unit, dear):
+def test_costs_are_scaled_to_about_one_for_solvers(unit, dear):
     """For any unit, and any cost of pairs that no plan needs, the incumbent keeps its cost, and nothing overflows."""
     cost, hint = np.array([3.0, 1.0, 2.0 * dear]) * unit, np.array([1, 1, 0])
     scaled, scale = scaled_costs(energy_model(cost, hint))
@@ -129,7 +129,7 @@ def test_costs_come_to_solvers_at_about_one(unit, dear):
     assert whole @ hint / fine == pytest.approx(cost @ hint, rel=1e-9, abs=0)
 
 
-def test_ordinary_costs_are_left_as_they_are():
+def test_ordinary_costs_are_not_scaled():
     """Costs of ordinary magnitude are passed to the solver unchanged."""
     cost = np.random.default_rng(0).random(5)
     scaled, scale = scaled_costs(energy_model(cost, np.ones(5, dtype=np.intp)))

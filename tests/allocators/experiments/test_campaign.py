@@ -65,7 +65,7 @@ def is_there(pid):
         return False
 
 
-def test_a_run_that_hangs_or_ends_its_process_stops_nobody_else(plugin):
+def test_hanging_or_exiting_run_does_not_affect_others(plugin):
     """A hanging run is killed at its limit, one that exits is recorded with its exit code; others are solved."""
     endings = run(plugin, [job("hang"), job("leave"), job("answer")], workers=1, kill_after_s=0.3)
     assert endings["hang"].outcome is Outcome.HUNG
@@ -76,7 +76,7 @@ def test_a_run_that_hangs_or_ends_its_process_stops_nobody_else(plugin):
 
 
 @pytest.mark.slow
-def test_every_way_to_end_is_recorded_and_stops_nobody_else(plugin):
+def test_every_kind_of_failure_is_recorded_and_does_not_affect_others(plugin):
     """Every kind of failure is recorded as such; runs of a good method before and after it are solved."""
     expected = {
         "answer": Outcome.SOLVED,
@@ -111,7 +111,7 @@ def test_every_way_to_end_is_recorded_and_stops_nobody_else(plugin):
         assert not is_there(int(pid))
 
 
-def test_what_is_there_is_not_run_again(plugin):
+def test_stored_runs_are_not_repeated(plugin):
     """A second campaign makes only the missing run, of another seed."""
     run(plugin, [job("nap", 0), job("nap", 1)], InProcess())
     run(plugin, [job("nap", seed) for seed in (2, 1, 0)], InProcess())
@@ -119,14 +119,14 @@ def test_what_is_there_is_not_run_again(plugin):
     assert sorted(ended) == ["0", "1", "2"]
 
 
-def test_runs_of_a_method_share_a_process_until_one_ends_badly(plugin):
+def test_process_is_reused_until_a_run_fails(plugin):
     """A process is reused for runs of its method, and replaced after a failure."""
     run(plugin, [job("pid", 0), job("pid", 1)], workers=1)
     assert len(set((plugin / "naps").read_text().splitlines())) == 1
 
 
 @pytest.mark.skipif(not cores.CAN_PIN, reason="this system does not pin processes")
-def test_timed_runs_have_processors_of_their_own(plugin, monkeypatch):
+def test_timed_runs_are_pinned_to_separate_processors(plugin, monkeypatch):
     """A run with a time limit waits until a processor is free, and is pinned to it."""
     monkeypatch.setattr(cores, "LOCK", f"\0alloc-test-{os.getpid()}-")
     every = sorted(os.sched_getaffinity(0))
@@ -157,7 +157,7 @@ def test_more_timed_runs_than_processors_are_refused(plugin):
         Campaign(store, [job("answer", time_limit_s=1.0)], Resources(workers=many))
 
 
-def test_a_campaign_that_is_stopped_gives_its_runs_back(plugin, monkeypatch):
+def test_stopped_campaign_releases_its_runs(plugin, monkeypatch):
     """After a stop request, no run is in progress or leased; completed runs are kept."""
     monkeypatch.setenv("NAP_S", "0.2")
     stop = threading.Event()
@@ -170,7 +170,7 @@ def test_a_campaign_that_is_stopped_gives_its_runs_back(plugin, monkeypatch):
         assert len(store.records()) == 2
 
 
-def test_a_store_that_fails_leaves_no_process_behind(plugin, monkeypatch):
+def test_failing_store_leaves_no_process_behind(plugin, monkeypatch):
     """If a row cannot be written, the campaign ends with that error, and all its processes end."""
 
     def fail(self, run, ending, plan):
@@ -185,7 +185,7 @@ def test_a_store_that_fails_leaves_no_process_behind(plugin, monkeypatch):
     assert not is_there(int((plugin / "naps").read_text().split()[0]))
 
 
-def test_what_auto_may_pick_is_loaded_before_its_time_counts(monkeypatch):
+def test_methods_of_auto_are_loaded_before_the_clock_starts(monkeypatch):
     """First compilation takes longer than the limit of a run, and does not count."""
     loaded = []
     monkeypatch.setattr(serve, "load", lambda name, **_: loaded.append(name))

@@ -31,7 +31,7 @@ pytestmark = [
 SEEDS = 8
 
 
-def test_a_machine_dies_half_way_and_every_run_is_there_once(tmp_path, monkeypatch):
+def test_every_run_is_stored_once_if_a_machine_dies(tmp_path, monkeypatch):
     """One of two machines is killed during a run, which another machine repeats; each run has one row."""
     evil_methods.install(tmp_path)
     monkeypatch.setenv("PYTHONPATH", str(tmp_path), prepend=os.pathsep)
@@ -70,7 +70,7 @@ def ended(path):
 
 
 @pytest.mark.parametrize(("error", "outcome"), [("WorkerCrashedError", "killed"), ("LocalRayletDiedError", None)])
-def test_only_what_a_run_did_is_held_against_its_method(error, outcome):
+def test_only_failures_of_the_run_itself_are_outcomes(error, outcome):
     """A crashed worker is an outcome; loss of the cluster, or an internal error there, ends the command."""
 
     def get(task):

@@ -39,7 +39,7 @@ def test_mean_and_worst_over_seeds():
     assert row.runtime_worst_s >= row.runtime_mean_s > 0
 
 
-def test_unserved_tasks_leave_no_makespan():
+def test_no_mean_makespan_with_unserved_tasks():
     """If a run leaves a task unserved, there is no mean over the other runs, which would be biased."""
     (row,) = compare([PARTLY], ["greedy"])
     assert (row.unserved, row.makespan_mean, row.gap_mean, row.statuses) == (1, None, None, "infeasible")
@@ -60,13 +60,13 @@ def test_missing_packages_are_rows(monkeypatch):
     assert "pip install ortools" in row.reason
 
 
-def test_auto_tells_what_it_picked():
+def test_auto_names_the_method_it_picked():
     """The row of `auto` names the method that ran."""
     (row,) = compare([SMALL], ["auto"])
     assert (row.method, row.picked) == ("auto", "cpsat")
 
 
-def test_rows_come_as_they_are_done_and_stop_when_asked():
+def test_rows_are_yielded_lazily_until_a_stop_request():
     """Rows are yielded lazily; after a stop request, only complete rows are returned."""
     stop = threading.Event()
     rows = compare([SMALL, PARTLY], ["greedy"], stop=stop)

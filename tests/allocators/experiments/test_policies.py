@@ -47,7 +47,7 @@ class SlowDecider(AgentDecider):
         time.sleep(2)
 
 
-def test_a_row_has_means_over_the_seeds():
+def test_row_has_means_over_the_seeds():
     """The figures of a row are the means, and the worst, of single runs with the same seeds."""
     (row,) = compare_policies(MISSIONS[:1], ["random"], [0, 1, 2])
     runs = [simulate(MISSIONS[0], "random", seed=seed).result for seed in (0, 1, 2)]
@@ -59,7 +59,7 @@ def test_a_row_has_means_over_the_seeds():
     assert row.switches_mean == pytest.approx(np.mean([run.switches for run in runs]))
 
 
-def test_undone_tasks_leave_no_mission_time():
+def test_no_mean_mission_time_with_undone_tasks():
     """If a run does not do all tasks, there is no mean mission time; the share of tasks done still counts."""
     (row,) = compare_policies(MISSIONS[:1], ["idle"])
     assert (row.mission_time_mean, row.tasks_done_share, row.statuses) == (None, 0.0, "unfinished")
@@ -73,7 +73,7 @@ def test_refusals_and_failures_are_rows():
     assert (refused.runs, failed.runs, fine.runs, fine.knowledge) == (0, 0, 1, "local")
 
 
-def test_a_policy_that_cannot_be_loaded_is_a_row(monkeypatch):
+def test_policy_that_cannot_be_loaded_is_a_row(monkeypatch):
     """A plugin that cannot be constructed does not affect the results of others."""
 
     def load(name):
@@ -99,7 +99,7 @@ def test_differences_are_paired_by_mission_and_seed():
     assert (alone.mission_time.pairs, alone.priority_done_share.mean) == (2, 0.0)
 
 
-def test_differences_are_those_of_the_page():
+def test_differences_match_the_report():
     """Mean, interval and number of pairs are those of `alloc report` on the same missions."""
     rows = list(compare_policies(MISSIONS, ["nearest", "random"], [0, 1]))
     (found,) = paired_differences(rows)
@@ -117,7 +117,7 @@ def test_differences_are_those_of_the_page():
         assert (own.low, own.high) == pytest.approx((theirs.low, theirs.high))
 
 
-def test_pairs_without_a_figure_are_left_out():
+def test_pairs_without_a_value_are_left_out():
     """A policy that did not do all tasks has no pair of mission times, but one of shares."""
     (found,) = paired_differences(list(compare_policies(MISSIONS[:1], ["nearest", "idle"])))
     assert (found.mission_time.mean, found.mission_time.pairs) == (None, 0)
@@ -125,7 +125,7 @@ def test_pairs_without_a_figure_are_left_out():
     assert (found.energy.mean, found.energy.pairs) == (None, 0)  # idling takes none
 
 
-def test_a_stop_ends_the_comparison():
+def test_stop_event_ends_the_comparison():
     """Once the event is set, no further run starts, and complete rows have been yielded."""
     stop = threading.Event()
     rows = compare_policies(MISSIONS, ["idle", "nearest"], stop=stop)
@@ -134,7 +134,7 @@ def test_a_stop_ends_the_comparison():
     assert list(rows) == []
 
 
-def test_a_stop_ends_a_run_within_a_second():
+def test_stop_event_ends_a_run_within_a_second():
     """A stop ends a run within a second though a decision takes longer, and the rows before it stay."""
     stop = threading.Event()
     rows = compare_policies(MISSIONS[:1], ["idle", Slow()], stop=stop)
@@ -154,7 +154,7 @@ def test_a_stop_ends_a_run_within_a_second():
         ((MISSIONS, [Faulty(), Faulty()]), "policies"),
     ],
 )
-def test_wrong_arguments(arguments, place):
+def test_wrong_arguments_are_refused(arguments, place):
     """Invalid arguments are an error before the first run that names the parameter."""
     with pytest.raises(InputError) as caught:
         compare_policies(*arguments)

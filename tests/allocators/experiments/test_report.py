@@ -52,7 +52,7 @@ def compared(tmp_path):
     return plan, endings, rows_of(plan, endings)
 
 
-def test_tables_tell_what_was_compared_and_how_it_ended(compared):
+def test_tables_show_methods_and_outcomes(compared):
     """Tables show methods, outcomes, differences of both objectives, profiles and targets, and note small samples."""
     tables = {table.title: table for table in report_tables(*compared)}
     assert list(tables) == [
@@ -80,7 +80,7 @@ def test_tables_tell_what_was_compared_and_how_it_ended(compared):
     assert tables["Targets over time"].rows[0][-1] == "100 %"
 
 
-def test_standings_tell_who_is_first_and_how_far_behind_the_others_are(compared):
+def test_standings_show_wins_and_excess(compared):
     """Methods with the best result, or a tie, are first, late runs never; excess is of runs that serve all tasks."""
     tables = {table.title: table for table in report_tables(*compared)}
     (best, other), beside = tables["Relative to the best known"].rows, tables["Relative to the other methods"].rows
@@ -96,7 +96,7 @@ def test_standings_tell_who_is_first_and_how_far_behind_the_others_are(compared)
     assert [one.first for one in standings(late, best_known(late), 2.0, energy=True).values()] == [1, 0]
 
 
-def test_runs_that_had_to_share_processors_are_told():
+def test_runs_that_shared_processors_are_reported():
     """Timed runs with little processor time cause a warning; short, untimed and quick ones do not."""
     poor = ending(1.0, cores="0", runtime_s=1.0, cpu_s=0.5)
     fine = ending(1.0, cores="0", runtime_s=1.0, cpu_s=0.99)
@@ -118,7 +118,7 @@ def test_markdown_and_latex_hold_the_same_cells(compared, tmp_path):
     assert tex.count(r"\toprule") == tex.count(r"\bottomrule") == text.count("## ")
 
 
-def test_latex_escapes_what_has_a_meaning():
+def test_latex_escapes_special_characters():
     """Names of methods may contain any character; braces and environments stay balanced."""
     text = latex([Table("50% of a_b", ["m", "x"], [["a{b}&c$#~^\\", "1"]], ["note"])])
     assert r"a\{b\}\&c\$\#\textasciitilde{}\textasciicircum{}\textbackslash{} & 1 \\" in text
@@ -156,7 +156,7 @@ def test_parquet_has_the_traces(compared, tmp_path):
     assert table["details"].to_pylist().count("Traceback") == 1
 
 
-def test_files_of_another_kind_are_refused(compared, tmp_path, monkeypatch):
+def test_unsupported_files_are_refused(compared, tmp_path, monkeypatch):
     """An unknown suffix, a missing package and a missing folder are reported before any run."""
     with pytest.raises(InputError, match=r"must end in \.md, \.tex, \.csv or \.parquet"):
         check_report(tmp_path / "runs.txt")
@@ -167,7 +167,7 @@ def test_files_of_another_kind_are_refused(compared, tmp_path, monkeypatch):
         check_report(tmp_path / "runs.parquet")
 
 
-def test_a_run_that_has_not_ended_has_no_row(compared):
+def test_unfinished_runs_have_no_row(compared):
     """Runs that have not ended have no rows in the tables or the CSV."""
     plan, endings, _ = compared
     open_ones = {label: [[None, None], *lists[1:]] for label, lists in endings.items()}

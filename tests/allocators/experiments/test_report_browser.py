@@ -114,7 +114,7 @@ def looked_at(folder, tmp_path, script, size, *flags):
     return run_in_browser(tmp_path / "page.html", script, tmp_path, size, [PATIENT, *flags])
 
 
-def test_the_page_sorts_filters_and_zooms(folder, tmp_path):
+def test_page_sorts_filters_and_zooms(folder, tmp_path):
     """Rows are sorted with missing values last; filters accept text and comparisons; stored data are shown as text."""
     found = looked_at(folder, tmp_path, STEPPED, "1200,800")
     assert found["charts"] == DRAWN
@@ -136,7 +136,7 @@ def test_the_page_sorts_filters_and_zooms(folder, tmp_path):
 
 
 @pytest.mark.parametrize(("size", "flags"), [("500,900", []), ("1200,800", [DARK])])
-def test_the_page_is_drawn_on_a_phone_and_in_the_dark(folder, tmp_path, size, flags):
+def test_page_supports_phones_and_dark_mode(folder, tmp_path, size, flags):
     """All charts are drawn, nothing is wider than the screen, and the page follows the system's dark mode."""
     found = looked_at(folder, tmp_path, LOADED, size, *flags)
     assert found["charts"] == DRAWN
@@ -144,7 +144,7 @@ def test_the_page_is_drawn_on_a_phone_and_in_the_dark(folder, tmp_path, size, fl
     assert found["overflow"] <= 0
 
 
-def test_a_page_of_little_says_so(tmp_path):
+def test_page_with_little_data_says_so(tmp_path):
     """Without runs there is one sentence; of failures alone, each chart of scores says why it is empty."""
     (tmp_path / "none.db").write_bytes(b"")
     report_html([tmp_path / "none.db"], tmp_path / "none.html")

@@ -53,7 +53,7 @@ def written(store, tmp_path, **options):
     return data_of(tmp_path / "report.html")
 
 
-def test_the_page_tells_what_was_run_and_how_it_ended(store, tmp_path):
+def test_page_shows_runs_and_outcomes(store, tmp_path):
     """Conditions, methods with their parameters, means, outcomes, and the statistics that `differences` gives."""
     main = written(store, tmp_path)["main"]
     (group,) = main["groups"]
@@ -74,7 +74,7 @@ def test_the_page_tells_what_was_run_and_how_it_ended(store, tmp_path):
     assert one["p_holm"] == float(f"{expected.p_holm:.6g}")
 
 
-def test_means_are_of_the_instances_that_every_method_served(store, tmp_path):
+def test_means_are_over_instances_that_every_method_served(store, tmp_path):
     """A method does not benefit from failing on hard instances; without a common instance there are no means."""
     of = "WHERE method = 'greedy' AND instance {} (SELECT instance FROM instances WHERE name = 'i3')"
     with sqlite3.connect(store) as edited:
@@ -94,7 +94,7 @@ def test_means_are_of_the_instances_that_every_method_served(store, tmp_path):
     assert any(note.startswith("No instance was served by every method") for note in group["notes"])
 
 
-def test_every_method_is_compared_with_one_where_every_pair_is_too_many(store, tmp_path, monkeypatch):
+def test_methods_are_compared_with_a_reference(store, tmp_path, monkeypatch):
     """The first method is the reference, or the one that is asked for; an unknown one is an error that names all."""
     found = written(store, tmp_path)["main"]["groups"][0]["paired"]
     assert {row["against"] for row in found} == {0, 1}  # the third one solved nothing
@@ -106,7 +106,7 @@ def test_every_method_is_compared_with_one_where_every_pair_is_too_many(store, t
         report_html([store], tmp_path / "report.html", against="x")
 
 
-def test_nothing_stored_is_html_or_script(store, tmp_path):
+def test_stored_data_are_never_markup(store, tmp_path):
     """Names and tracebacks with tags are only in the compressed data; the title is escaped."""
     data = written(store, tmp_path, title=f"All {ANGRY}")
     text = (tmp_path / "report.html").read_text()
@@ -117,7 +117,7 @@ def test_nothing_stored_is_html_or_script(store, tmp_path):
     assert "<title>All &lt;/script&gt;" in text
 
 
-def test_runs_are_columns_and_know_their_failures(store, tmp_path):
+def test_runs_are_stored_as_columns_with_their_failures(store, tmp_path):
     """Each run has its values at the same index of all columns; repeated failures are stored once."""
     data = written(store, tmp_path)
     runs, failures = data["runs"], data["main"]["failures"]
@@ -129,7 +129,7 @@ def test_runs_are_columns_and_know_their_failures(store, tmp_path):
     assert [one["runs"] for one in failures] == [8, 1]
 
 
-def test_maps_hold_places_groups_and_plans(store, tmp_path):
+def test_maps_contain_places_groups_and_plans(store, tmp_path):
     """Places are exact to three digits; each method has its best plan, with groups and times."""
     data = written(store, tmp_path)
     main, detail = data["main"], data["detail-0"]
@@ -148,7 +148,7 @@ def test_maps_hold_places_groups_and_plans(store, tmp_path):
     assert [EDGES_S[trace[0]] >= 0.5, trace[1], len(trace)] == [True, 1.0, 2]
 
 
-def test_large_instances_are_thinned_and_small_rooms_leave_some_out(store, tmp_path, monkeypatch):
+def test_large_instances_are_sampled_and_maps_limited_in_size(store, tmp_path, monkeypatch):
     """Maps of large instances show a subset of agents and tasks; beyond the size limit, instances have no map."""
     for limit in ("MOST_AGENTS", "MOST_TASKS"):
         monkeypatch.setattr(details_module, limit, 1)
@@ -178,7 +178,7 @@ def test_thinned_traces_reach_the_same_targets():
     assert targets_reached(short, EDGES_S) == targets_reached(endings, EDGES_S)
 
 
-def test_series_are_those_of_the_statistics(store):
+def test_series_match_the_statistics(store):
     """Profiles are those of `profiles`; quantiles of curves, gaps and sizes are of the runs; points are instances."""
     layout = laid_out(read_stores([store]))
     (group,) = layout.groups
@@ -195,7 +195,7 @@ def test_series_are_those_of_the_statistics(store):
     assert sizes["runtime_s"]["middle"] == 0.5
 
 
-def test_runs_under_other_conditions_are_told_apart(store, tmp_path):
+def test_runs_under_other_conditions_are_distinguished(store, tmp_path):
     """Another budget is another group; a plugin's version is part of its method; the same run twice counts once."""
     fill(tmp_path / "more.db", time_limit_s=2.0)
     report_html([store, tmp_path / "more.db", store], tmp_path / "report.html")
@@ -210,7 +210,7 @@ def test_runs_under_other_conditions_are_told_apart(store, tmp_path):
     assert sorted(found["labels"]) == ["ga[population=4]", "greedy", "hedonic (plug 1)", "hedonic (plug 2)"]
 
 
-def test_the_plan_of_a_run_is_of_the_store_that_its_record_is_of(tmp_path):
+def test_plan_and_record_of_a_run_come_from_the_same_store(tmp_path):
     """If a run is in two stores, the record that ended last counts, with its plan, whatever the order of the stores."""
     stores = [tmp_path / "early.db", tmp_path / "late.db"]
     for store in stores:
@@ -224,7 +224,7 @@ def test_the_plan_of_a_run_is_of_the_store_that_its_record_is_of(tmp_path):
         assert [unpacked(plan).task_of_agent.tolist() for plan in plans.values()] == [[-1, 1, 0]] * 2
 
 
-def test_the_time_of_a_mission_stands_for_the_makespan(store, tmp_path):
+def test_mission_time_is_used_as_makespan(store, tmp_path):
     """Runs of policies have measures as JSON; an unfinished mission has no time."""
     with sqlite3.connect(store) as edited:
         if "measures" not in {row[1] for row in edited.execute("PRAGMA table_info(runs)")}:
@@ -238,7 +238,7 @@ def test_the_time_of_a_mission_stands_for_the_makespan(store, tmp_path):
     assert rows["ga[population=4]"]["makespan"] is None
 
 
-def test_what_there_is_little_of_is_told(tmp_path):
+def test_missing_data_are_reported(tmp_path):
     """No runs, one run, one method, only failures and no bounds: the page is written, and notes say what is missing."""
     Store(tmp_path / "runs.db").close()
     assert written(tmp_path / "runs.db", tmp_path)["main"]["groups"] == []
@@ -256,7 +256,7 @@ def test_what_there_is_little_of_is_told(tmp_path):
         assert any(note.startswith(words) for note in group["notes"]), (words, group["notes"])
 
 
-def test_a_store_of_the_first_version_has_no_maps(store, tmp_path):
+def test_store_of_the_first_version_has_no_maps(store, tmp_path):
     """It is read without being changed; missing data are left out."""
     with sqlite3.connect(store) as older:
         older.executescript(
@@ -268,7 +268,7 @@ def test_a_store_of_the_first_version_has_no_maps(store, tmp_path):
     assert sqlite3.connect(store).execute("PRAGMA user_version").fetchone() == (1,)
 
 
-def test_what_cannot_be_read_or_written_is_an_error(store, tmp_path, monkeypatch):
+def test_unreadable_and_unwritable_files_are_errors(store, tmp_path, monkeypatch):
     """A missing store, another suffix, and a missing package are errors of one line; no page is left behind."""
     with pytest.raises(InputError, match=r"no\.db: there is no such file"):
         report_html([tmp_path / "no.db"], tmp_path / "report.html")
@@ -283,7 +283,7 @@ def test_what_cannot_be_read_or_written_is_an_error(store, tmp_path, monkeypatch
     assert [path.name for path in tmp_path.iterdir() if path.suffix == ".html"] == []
 
 
-def test_progress_is_told(store, tmp_path):
+def test_progress_is_reported(store, tmp_path):
     """The progress of a long report is reported."""
     said = []
     report_html([store], tmp_path / "report.html", progress=said.append)
@@ -307,7 +307,7 @@ NOBODY = 65534
 
 
 @pytest.mark.skipif(not hasattr(os, "seteuid"), reason="users and their rights are those of POSIX")
-def test_a_store_in_a_folder_that_is_read_only_is_read_unless_somebody_writes_it(foreign_folder):
+def test_store_in_a_read_only_folder_is_read_unless_in_use(foreign_folder):
     """Runs in the write-ahead log are seen if SQLite can read it; a leftover log is a one-line error."""
     folder, writer, become_another = foreign_folder
     writer.execute("UPDATE runs SET makespan = 7.0")

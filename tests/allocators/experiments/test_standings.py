@@ -20,7 +20,7 @@ def stand(endings, label, *, energy=False):
     return found
 
 
-def test_a_run_that_serves_fewer_tasks_is_not_the_best():
+def test_run_that_serves_fewer_tasks_is_never_best():
     """A plan that leaves out the longest task has a shorter makespan, but no comparison with the bound, and loses."""
     endings = {"all": [[solved(2.0, 4.0, lower_bound=1.6)]], "some": [[solved(1.0, 1.0, unserved=1)]]}
     assert best_known(endings) == [Best(1.6, 0, 2.0, 4.0)]
@@ -31,7 +31,7 @@ def test_a_run_that_serves_fewer_tasks_is_not_the_best():
     assert np.isnan([stand(endings, "some").beyond_bound, stand(endings, "some").energy_ratio]).all()
 
 
-def test_where_no_plan_serves_all_tasks_those_that_serve_most_are_compared():
+def test_plans_that_serve_most_tasks_are_compared_if_none_serves_all():
     """The fewest unserved tasks come first, then the makespan over the served ones."""
     endings = {"a": [[solved(3.0, 2.0, 1)]], "b": [[solved(2.0, 3.0, 1)]], "c": [[solved(1.0, 1.0, 2)]]}
     assert best_known(endings) == [Best(0.0, 1, 2.0, 3.0)]
@@ -40,7 +40,7 @@ def test_where_no_plan_serves_all_tasks_those_that_serve_most_are_compared():
     assert [found[label].first for label in "abc"] == [0, 1, 0]
 
 
-def test_runs_are_behind_the_best_of_the_others():
+def test_excess_is_relative_to_the_best_of_the_others():
     """Negative values lead; energy is compared with that of methods that are no slower."""
     endings = {"a": [[solved(1.0, 3.0)]], "b": [[solved(2.0, 1.0)]]}
     first, second = stand(endings, "a", energy=True), stand(endings, "b", energy=True)

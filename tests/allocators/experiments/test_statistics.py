@@ -51,7 +51,7 @@ def test_instances_without_a_score_are_left_out_and_counted():
     assert (one.low, one.high, one.p, one.p_holm) == (None, None, None, None)
 
 
-def test_two_scores_of_nothing_are_equal():
+def test_two_zero_scores_are_equal():
     """Two energies of 0 are equal; ratios of 1 to 0 are left out."""
     endings = {"a": [[solved(1.0, 0.0)]] * 2 + [[solved(1.0, 2.0)]]}
     endings["b"] = [[solved(1.0, 0.0)], [solved(1.0, 1.0)], [solved(1.0, 1.0)]]
@@ -60,7 +60,7 @@ def test_two_scores_of_nothing_are_equal():
     assert one.mean == pytest.approx(-0.25)
 
 
-def test_small_samples_are_known_as_such():
+def test_small_samples_are_recognised():
     """Nine instances are a small sample, ten are not."""
     assert differences({"a": runs(*[1] * 9), "b": runs(*[2] * 9)})[0].is_small
     assert not differences({"a": runs(*[1] * 10), "b": runs(*[2] * 10)})[0].is_small
@@ -75,14 +75,14 @@ def test_wilcoxon_has_the_exact_p_value():
     assert signed_rank(np.ones(2)) is None
 
 
-def test_holm_multiplies_by_what_is_left():
+def test_holm_multiplies_by_the_remaining_hypotheses():
     """The smallest p of three counts three times, the next twice, and none is below the one before it."""
     assert holm([0.04, 0.01, None, 0.03]) == pytest.approx([0.06, 0.03, None, 0.06], nan_ok=True)
     assert holm([0.9, 0.8]) == [1.0, 1.0]
     assert holm([]) == []
 
 
-def test_intervals_hold_the_mean_as_often_as_they_say(monkeypatch):
+def test_intervals_have_their_nominal_coverage(monkeypatch):
     """About 95 % of intervals from thirty skewed values contain the true mean, more than of normal intervals."""
     monkeypatch.setattr(statistics, "RESAMPLES", 999)
     rng = np.random.default_rng(7)

@@ -15,7 +15,7 @@ SEEDS = [seed for seed in range(40) if varied_instance(seed).n <= 4 and all_can_
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-def test_every_fleet_has_the_optimum_of_brute_force(seed: int) -> None:
+def test_every_fleet_matches_brute_force(seed: int) -> None:
     """With copies of an agent, and without another, makespan and energy are optimal and proven."""
     instance = varied_instance(seed)
     gone = [instance.agent_ids[1]] if instance.n > 2 else []
@@ -47,7 +47,7 @@ def test_makespans_never_rise_with_more_agents(seed: int) -> None:
         assert bound <= brute_force(fleet.result.instance).makespan * (1 + 1e-9)
 
 
-def test_copies_are_the_same_in_all_but_their_ids() -> None:
+def test_copies_differ_only_in_their_ids() -> None:
     """A copy has the place, limits, skills and given distances of its model, and a new id."""
     instance = Instance(
         ability=[1, 2], workload=[3, 1], agent_ids=["d", "d+1"], agent_position=[[0, 0], [1, 1]], battery=[5, 7],
@@ -84,13 +84,13 @@ def test_the_answer_is_a_sentence(arguments: dict[str, object], expected: str) -
     assert whatif(LINE, method="cpsat", **arguments).answer == expected
 
 
-def test_small_changes_have_as_many_digits_as_they_need() -> None:
+def test_small_changes_have_enough_digits() -> None:
     """Two makespans that differ in their fifth digit are not reported as equal."""
     instance = Instance(ability=[1e5, 3.0, 1.0], workload=[1e5])
     assert whatif(instance, "a2", method="cpsat").answer.startswith("one more like a2: 0.99993 instead of 0.99996 (")
 
 
-def test_the_answer_where_tasks_are_unserved_or_nothing_changes() -> None:
+def test_answer_with_unserved_tasks_or_no_effect() -> None:
     """Tasks that no agent can serve, and agents without effect, are reported, and whether this is proven."""
     few = Instance(ability=[2, 3], workload=[2, 3, 4])
     assert whatif(few, "a2", up_to=2).answer.startswith("one more like a2: every task is served, in 1.333; 2 more")
@@ -100,7 +100,7 @@ def test_the_answer_where_tasks_are_unserved_or_nothing_changes() -> None:
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-def test_the_answer_says_what_is_not_proven(seed: int) -> None:
+def test_answer_says_what_is_not_proven(seed: int) -> None:
     """If optimality is not proven, the stated range contains the true change, by brute force."""
     instance = varied_instance(seed)
     found = whatif(instance, instance.agent_ids[0], method="greedy", iterations=1, time_limit_s=None)
@@ -114,7 +114,7 @@ def test_the_answer_says_what_is_not_proven(seed: int) -> None:
         assert float(least) - 0.51 <= change <= float(most) + 0.51
 
 
-def test_stopping_keeps_the_fleets_so_far() -> None:
+def test_stopped_run_keeps_the_fleets_so_far() -> None:
     """After a stop request, the fleets so far are returned and marked as incomplete."""
     stop, seen = threading.Event(), []
 
@@ -129,7 +129,7 @@ def test_stopping_keeps_the_fleets_so_far() -> None:
     assert len(found.fleets) == 2
 
 
-def test_the_first_fleet_is_the_instance_itself() -> None:
+def test_first_fleet_is_the_instance_itself() -> None:
     """The first fleet has the result of `solve`."""
     assert whatif(LINE, "d2", method="cpsat").fleets[0].result.makespan == solve(LINE, "cpsat").makespan
 
@@ -148,13 +148,13 @@ def test_the_first_fleet_is_the_instance_itself() -> None:
         ({"remove": ["d1", "d2"]}, "remove: leaves no agent"),
     ],
 )
-def test_wrong_arguments_are_told(arguments: dict[str, object], message: str) -> None:
+def test_wrong_arguments_are_refused(arguments: dict[str, object], message: str) -> None:
     """The error names the parameter."""
     with pytest.raises(InputError, match=message):
         whatif(LINE, **arguments)
 
 
-def test_a_method_refuses_as_in_solve() -> None:
+def test_refusals_of_the_method_are_raised() -> None:
     """Refusals of the method are raised."""
     with pytest.raises(RefusedError):
         whatif(Instance(ability=[1], workload=[1], speed=[1]), "a1", method="ga")

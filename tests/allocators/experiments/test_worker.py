@@ -13,7 +13,7 @@ DESCRIPTORS = Path("/proc/self/fd")
 
 
 @pytest.mark.skipif(not DESCRIPTORS.exists(), reason="lists the open descriptors of a process on Linux")
-def test_a_process_that_cannot_be_started_leaves_no_descriptor(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_failed_process_start_leaks_no_descriptor(monkeypatch: pytest.MonkeyPatch) -> None:
     """Pipe and sockets are closed where there are too many processes for another one."""
 
     def refuse(*arguments: object, **options: object) -> None:

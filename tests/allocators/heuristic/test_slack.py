@@ -21,7 +21,7 @@ def notes_on_slack(result):
     return [note for note in result.notes if "more time would save" in note]
 
 
-def test_the_saving_is_of_a_plan():
+def test_noted_saving_is_reached_with_slack():
     """At the least makespan of real-valued abilities energy is high, and a run with slack saves what the note says."""
     result = solve(REAL, objective="makespan-energy", **SETTINGS)
     (note,) = notes_on_slack(result)
@@ -45,13 +45,13 @@ def test_the_saving_is_of_a_plan():
         (REAL, {"objective": "makespan-energy", "method": "greedy"}),
     ],
 )
-def test_it_is_told_where_it_is_of_use(instance, settings):
+def test_note_on_slack_appears_only_where_useful(instance, settings):
     """Whole abilities, a run for the makespan alone or with slack, and methods without search have no such note."""
     assert notes_on_slack(solve(instance, **{**SETTINGS, **settings})) == []
 
 
 @pytest.mark.parametrize("limit", [None, 60])
-def test_small_instances_are_not_searched_for_long(limit, monkeypatch):
+def test_small_instances_are_searched_briefly(limit, monkeypatch):
     """Each search makes an iteration for each agent at the most, however much time there is."""
     made = []
 

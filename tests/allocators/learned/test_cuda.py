@@ -56,7 +56,7 @@ def states(board: Board) -> Iterator[State]:
 
 
 @pytest.mark.parametrize("name", BOARDS)
-def test_scores_are_those_of_the_cpu(name: str) -> None:
+def test_scores_match_the_cpu(name: str) -> None:
     """Bids, reserve and value agree to single precision, in any state."""
     board, (here, there) = BOARDS[name](), pair()
     for state in states(board):
@@ -67,7 +67,7 @@ def test_scores_are_those_of_the_cpu(name: str) -> None:
 
 @pytest.mark.parametrize("total", [True, False])
 @pytest.mark.parametrize("name", BOARDS)
-def test_greedy_games_are_those_of_the_cpu(name: str, total: bool) -> None:
+def test_greedy_games_match_the_cpu(name: str, total: bool) -> None:
     """Played greedily, every game ends in the same best position."""
     board, (here, there) = BOARDS[name](), pair()
     expected, found = (play_games(one, board, games_on(board), rounds=12, total=total) for one in (here, there))
@@ -77,7 +77,7 @@ def test_greedy_games_are_those_of_the_cpu(name: str, total: bool) -> None:
     assert torch.equal(found.slot, expected.slot)
 
 
-def test_drawn_games_repeat() -> None:
+def test_sampled_games_are_reproducible() -> None:
     """Drawn games are legal, and the same again by the same seed, to the last bit."""
     board, (_, there) = BOARDS["ranged"](), pair()
     games = games_on(board, 50)
@@ -88,7 +88,7 @@ def test_drawn_games_repeat() -> None:
     assert board.legal[torch.from_numpy(games.row)].gather(2, first.slot[..., None]).all()
 
 
-def test_sums_repeat() -> None:
+def test_sums_are_reproducible() -> None:
     """What agents bring to a place adds up to the same, to the last bit, in any number of games, and as on the CPU."""
     generator = torch.Generator().manual_seed(0)
     values = torch.rand(64, 300, 5, generator=generator)
@@ -100,7 +100,7 @@ def test_sums_repeat() -> None:
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_plans_are_valid_and_repeat(method: str) -> None:
+def test_plans_are_valid_and_reproducible(method: str) -> None:
     """Counted in sweeps, every method answers every instance twice the same, with one thread and with two."""
     policy = load(method, device="cuda")
     for name, instance in INSTANCES.items():
@@ -114,7 +114,7 @@ def test_plans_are_valid_and_repeat(method: str) -> None:
         assert first.allocation == again.allocation, name
 
 
-def test_the_time_limit_holds() -> None:
+def test_time_limit_is_respected() -> None:
     """A run ends in time, large boards included, and answers."""
     policy = load("gappo", device="cuda")
     for instance in (INSTANCES["paper"], paper_like(500, 50, 2400, seed=1)):
@@ -123,7 +123,7 @@ def test_the_time_limit_holds() -> None:
         assert result.runtime_s <= 0.5 * 1.1 + 0.5
 
 
-def test_a_board_of_many_games() -> None:
+def test_board_of_many_games_matches_single_games() -> None:
     """Thousands of games at once end as they do alone."""
     board, (_, there) = layout(*(paper_like(30, 6, 130, seed) for seed in range(4))), pair()
     many = play_games(there, board, games_on(board, 1000), rounds=12)

@@ -33,7 +33,7 @@ def gappo() -> Allocator:
 
 
 @pytest.mark.parametrize("name", SHIPPED)
-def test_first_answer_on_unseen_paper_instances(name: str) -> None:
+def test_greedy_game_is_near_the_optimum_on_paper_instances(name: str) -> None:
     """One greedy game, before any search: T is within 15 % of the optimum on three instances of scenario 1."""
     policy = load(name)
     for seed in range(3):
@@ -42,14 +42,14 @@ def test_first_answer_on_unseen_paper_instances(name: str) -> None:
         assert makespan <= 1.15
 
 
-def test_games_on_parts_reach_the_bound(gappo: Allocator) -> None:
+def test_regional_games_reach_the_bound(gappo: Allocator) -> None:
     """A few sweeps bring T to 1 on a small instance like the paper's, which proves it optimal."""
     result = solve(paper_like(40, 8, 160, seed=3), gappo, iterations=40, time_limit_s=None)
     assert result.makespan == 1.0
     assert result.status is Status.OPTIMAL
 
 
-def test_energy_counts(gappo: Allocator) -> None:
+def test_energy_objective_saves_energy(gappo: Allocator) -> None:
     """With energy in the objective the same policy flies less than without, and slack saves more."""
     instance = paper_like(40, 8, 160, seed=3)
     results = [
@@ -73,7 +73,7 @@ def test_reach_and_speed_are_respected(gappo: Allocator) -> None:
         assert result.gap is None or result.gap < 0.25
 
 
-def test_same_seed_same_answer(gappo: Allocator) -> None:
+def test_same_seed_gives_same_answer(gappo: Allocator) -> None:
     """Counted in sweeps, a run is reproducible, from several threads at once too."""
     instance = paper_like(30, 6, 120, seed=9)
     answers: list[Allocation | None] = [None] * 3
@@ -91,7 +91,7 @@ def test_same_seed_same_answer(gappo: Allocator) -> None:
     assert answers[0] == answers[1] == answers[2]
 
 
-def test_global_generators_are_left_alone(gappo: Allocator) -> None:
+def test_global_generators_are_not_used(gappo: Allocator) -> None:
     """A run draws from its own generators, and leaves torch's thread count as it was."""
     threads, before = torch.get_num_threads(), torch.random.get_rng_state()
     solve(paper_like(30, 6, 120, seed=9), gappo, iterations=2, time_limit_s=None)
@@ -99,14 +99,14 @@ def test_global_generators_are_left_alone(gappo: Allocator) -> None:
     assert torch.get_num_threads() == threads
 
 
-def test_a_warm_start_is_built_on(gappo: Allocator) -> None:
+def test_warm_start_is_never_lost(gappo: Allocator) -> None:
     """Started from a perfect plan, the answer is as good."""
     instance = Instance(ability=np.ones(12), workload=np.full(4, 3.0))
     perfect = Allocation(np.arange(12) % 4)
     assert solve(instance, gappo, start=perfect, iterations=2, time_limit_s=None).makespan == 1.0
 
 
-def test_local_search_goes_on_from_the_policy() -> None:
+def test_local_search_continues_from_the_policy() -> None:
     """The hybrid is no worse than one game of the policy alone."""
     instance = paper_like(40, 8, 160, seed=3)
     alone = solve(instance, "gappo", iterations=0, time_limit_s=None, objective="makespan-energy").evaluation
@@ -117,7 +117,7 @@ def test_local_search_goes_on_from_the_policy() -> None:
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
-def test_the_hybrid_is_never_behind_its_policy(gappo: Allocator, seed: int) -> None:
+def test_hybrid_is_never_worse_than_its_policy(gappo: Allocator, seed: int) -> None:
     """Where travel takes long, `gappo-ls` begins with the first plan of `gappo`, and soon has a far better one."""
     instance = long_travel(seed)
     first = solve(instance, gappo, iterations=0, time_limit_s=None, threads=1).makespan
@@ -126,7 +126,7 @@ def test_the_hybrid_is_never_behind_its_policy(gappo: Allocator, seed: int) -> N
     assert hybrid.makespan < 0.98 * first
 
 
-def test_too_large_an_instance_is_refused_beforehand(gappo: Allocator) -> None:
+def test_too_large_instances_are_refused_beforehand(gappo: Allocator) -> None:
     """Where a single game would not end in time, it says so and names its limit."""
     huge = Instance(ability=np.ones(10_000), workload=np.ones(1_000))
     assert gappo.refusal(huge, Objective.MAKESPAN, Budget(time_limit_s=1.0)) is not None
@@ -134,7 +134,7 @@ def test_too_large_an_instance_is_refused_beforehand(gappo: Allocator) -> None:
         solve(huge, gappo, time_limit_s=1.0)
 
 
-def test_a_policy_of_ones_own(tmp_path: Path) -> None:
+def test_own_policy_is_used_only_by_its_method(tmp_path: Path) -> None:
     """A policy file that somebody trained is played by the method that trained it, and by no other."""
     torch.manual_seed(0)
     save_policy(tmp_path / "own.safetensors", [ActorCritic(NetworkSize(8, 8, 2))], "ppo")
@@ -145,13 +145,13 @@ def test_a_policy_of_ones_own(tmp_path: Path) -> None:
         load("gappo", policy=tmp_path / "own.safetensors")
 
 
-def test_unknown_policy_file() -> None:
+def test_missing_policy_file_is_refused_beforehand() -> None:
     """A policy file that is not there is told before anything runs."""
     with pytest.raises(InputError, match="no such policy file"):
         load("gappo", policy="/nonexistent/policy.safetensors")
 
 
-def test_what_is_no_policy_is_told_before_torch_is_loaded() -> None:
+def test_invalid_policy_file_is_refused_before_torch_is_loaded() -> None:
     """Whoever mistypes a file does not wait for torch, which takes seconds."""
     code = (
         "import sys\nfrom alloc.allocators import load\nfrom alloc.problems import InputError\n"
@@ -164,13 +164,13 @@ def test_what_is_no_policy_is_told_before_torch_is_loaded() -> None:
 
 
 @pytest.mark.parametrize("device", ["nonsense", "cuda:99", "xpu:7", "meta", "mps", "tpu", "hpu", ""])
-def test_devices_that_are_not_there(device: str) -> None:
+def test_unavailable_devices_are_refused(device: str) -> None:
     """A device that cannot be used is told in one plain line, whatever torch says of it."""
     with pytest.raises(InputError, match=f"^device: {device!r} cannot be used here; use cpu( or cuda)?$"):
         load("gappo", device=device)
 
 
-def test_degenerate_instances(gappo: Allocator) -> None:
+def test_degenerate_instances_are_solved(gappo: Allocator) -> None:
     """One agent and one task, nothing to do, nobody able: no method may stumble over them."""
     assert solve(Instance(ability=[2], workload=[3]), gappo, time_limit_s=0.3).makespan == 1.5
     assert solve(Instance(ability=[1, 1], workload=[0, 0]), gappo, time_limit_s=0.3).makespan == 0

@@ -24,7 +24,7 @@ def known_answer(name: str) -> torch.Tensor:
 
 
 @pytest.mark.parametrize("name", PROBES)
-def test_answers_are_known(name: str) -> None:
+def test_enumerated_optima_match_known_answers(name: str) -> None:
     """The optimum found by enumeration is the one known by reasoning."""
     board = probe(name).board
     slot = known_answer(name)
@@ -33,7 +33,7 @@ def test_answers_are_known(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", PROBES)
-def test_playing_without_learning_is_not_enough(name: str) -> None:
+def test_untrained_network_does_not_solve_probes(name: str) -> None:
     """An untrained network does not solve all games, nor does the initial allocation."""
     board = probe(name).board
     assert share_solved(Ppo(), board) < 1

@@ -196,7 +196,7 @@ def require_equal(reference: MissionResult, compiled: MissionResult) -> None:
 
 
 @pytest.mark.parametrize("seed", range(60))
-def test_both_simulations_are_the_same(seed: int) -> None:
+def test_both_simulations_agree(seed: int) -> None:
     """On small random missions, knowledge, accepted orders and results agree at all hours."""
     require_equal(*run_both(random_mission(seed), seed, random.Random(seed).choice([0.5, 0.9, 0.98])))
 

@@ -43,7 +43,7 @@ def missions() -> list[Mission]:
         ("gappo", {"periods": 10}),
     ],
 )
-def test_compiled_runs_have_the_measures_of_the_reference(name: str, settings: dict[str, float]) -> None:
+def test_compiled_runs_match_the_reference(name: str, settings: dict[str, float]) -> None:
     """A policy reaches the same mission time, energy, switches and bytes in both simulations."""
     policy = load_policy(name, **settings)
     for seed, mission in enumerate(missions()):
@@ -75,7 +75,7 @@ def drawn_mission(seed: int) -> Mission:
     return Mission(mission.instance, **kept, radio=radio, pace=pace, sensing=rng.choice([0.15, 0.3, 0.6, math.inf]))
 
 
-def test_drawn_missions_have_all_measures_of_the_reference(request: pytest.FixtureRequest) -> None:
+def test_random_missions_match_the_reference(request: pytest.FixtureRequest) -> None:
     """In small missions of all families and radios, all measures agree except decision times."""
     for seed in range(request.config.getoption("--draws") or 40):
         mission, policy = drawn_mission(seed), load_policy(LOOPS[seed // len(FAMILIES) % len(LOOPS)])
@@ -87,7 +87,7 @@ def test_drawn_missions_have_all_measures_of_the_reference(request: pytest.Fixtu
                 assert found[name] == same, (seed, policy.info.name, name)
 
 
-def test_a_grid_finds_nearby_agents() -> None:
+def test_grid_finds_nearby_agents() -> None:
     """With more than a hundred agents, nearby ones are found by a grid of cells, and both simulations agree."""
     drawn = random_mission(MissionParameters("failures", 150, 20, radius=0.12, sensing=0.12), 5)
     kept = {name: getattr(drawn, name) for name in KEPT if name != "horizon"}
@@ -106,7 +106,7 @@ def test_policies_without_a_compiled_version_are_refused() -> None:
         run_compiled(missions()[0], load_policy("idle"))
 
 
-def test_an_interrupted_tuning_is_resumed(tmp_path: Path) -> None:
+def test_interrupted_tuning_is_resumed(tmp_path: Path) -> None:
     """Two generations in two runs are the same as in one run."""
     small = MissionTrainingParameters(missions=1, candidates=4, validations=1)
     whole = list(tune("auction", 2, 3, setting=small))

@@ -60,7 +60,7 @@ class Searching(Policy):
 
 
 @pytest.mark.parametrize("knowledge", Knowledge)
-def test_nothing_leaks(knowledge):
+def test_no_hidden_information_leaks(knowledge):
     """Views and briefings contain no id, place or workload of an unknown task, and no hour of a future failure."""
     drawn = random_mission(MissionParameters(family="failures", agents=5, tasks=8, sensing=0.25), 1)
     mission = Mission(
@@ -78,7 +78,7 @@ def test_nothing_leaks(knowledge):
     assert policy.leaks - area == set()
 
 
-def test_the_search_looks_behind_private_attributes():
+def test_search_covers_private_attributes():
     """Ids and hours are found in containers and attributes of any depth."""
     mission = random_mission(MissionParameters(family="failures", agents=3, tasks=2), 1)
 

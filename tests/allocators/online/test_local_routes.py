@@ -39,7 +39,7 @@ def drawn(sensing=0.3, **more):
     return Mission(instance, knowledge="local", sensing=sensing, radio=radio, horizon=40.0, seed=1)
 
 
-def test_notes_carry_all_routes():
+def test_notes_contain_all_routes():
     """An agent that receives notes knows all routes of their sender, whatever it knew before."""
     one, other = announced(a1=EARLY, a2=LATE), announced(a1=Route(0.5, "a1", (("t9", 1.0),)))
     other.hear(one.notes())
@@ -47,7 +47,7 @@ def test_notes_carry_all_routes():
 
 
 @pytest.mark.parametrize("order", [(EARLY, LATE), (LATE, EARLY)])
-def test_the_newer_route_counts(order):
+def test_newer_route_counts(order):
     """The order in which two routes of an agent are received does not matter."""
     known = announced()
     for route in order:
@@ -55,7 +55,7 @@ def test_the_newer_route_counts(order):
     assert known.routes == {"a3": LATE}
 
 
-def test_at_equal_hours_the_first_planner_counts():
+def test_first_planner_counts_at_equal_hours():
     """All agents agree on one of two plans made at the same hour."""
     one, other = Route(1.0, "a1", ()), Route(1.0, "a2", (("t1", 2.0),))
     for order in ((one, other), (other, one)):
@@ -65,14 +65,14 @@ def test_at_equal_hours_the_first_planner_counts():
         assert known.routes["a3"] == one
 
 
-def test_a_planner_may_replace_its_own_route_in_the_same_hour():
+def test_planner_may_replace_its_own_route_in_the_same_hour():
     """Of two routes by one planner in the same hour, the last counts."""
     known = announced(a1=EARLY)
     known.plan("a1", Route(1.0, "a1", (("t3", 2.0),)))
     assert known.routes["a1"].tasks == ["t3"]
 
 
-def test_tasks_are_left_to_others_while_their_routes_last():
+def test_tasks_in_current_routes_of_others_are_left_to_them():
     """A task belongs to the newest route that contains it; a route that ended long ago no longer counts."""
     known = announced(a1=EARLY, a2=LATE)
     assert known.taken({"a3"}, 3.0, 1.0) == {"t1": 3.0, "t2": 4.0}
@@ -81,7 +81,7 @@ def test_tasks_are_left_to_others_while_their_routes_last():
     assert known.taken({"a3"}, 10.0, 1.0) == {}
 
 
-def test_a_task_planned_twice_stays_with_the_earliest():
+def test_task_planned_twice_stays_with_the_earliest():
     """Agents that meet drop tasks that another plan does earlier; a coalition within one plan stays."""
     known = announced(a1=EARLY, a2=LATE)
     assert known.joined(["a1", "a2"]) == {"a1": ["t1"], "a2": ["t2"]}
@@ -107,7 +107,7 @@ def test_agents_explore_their_parts_of_the_area():
         assert np.linalg.norm(goal) <= np.linalg.norm(np.subtract(goal, other)) + 1e-9
 
 
-def test_a_cell_counts_as_seen_only_as_a_whole():
+def test_cell_counts_as_seen_only_as_a_whole():
     """A corner of the area, at 1.41, is explored although the centre of its cell, at 1.38, was seen from (0.1, 0)."""
     goal = looked(drawn(sensing=1.33), []).position
     assert np.linalg.norm(goal) > 1.28
@@ -138,7 +138,7 @@ def test_old_reports_do_not_count_as_contact():
 
 @pytest.mark.slow
 @pytest.mark.timeout(300)
-def test_an_agent_gives_up_a_route_beyond_its_battery():
+def test_agent_abandons_a_route_beyond_its_battery():
     """A route planned by others may need more energy than the agent has by now."""
     mission = drawn(energy_per_distance=1, battery=[1, 1e-3, 1])
     simulation = Simulation(mission)

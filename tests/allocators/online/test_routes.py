@@ -47,7 +47,7 @@ def worth(known, plan):
 
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("family", FAMILIES)
-def test_the_schedule_agrees_with_the_simulation(family, seed):
+def test_schedule_agrees_with_the_simulation(family, seed):
     """A plan made with full foresight and followed completes each task at the hour in its schedule."""
     mission = drawn(family, seed)
     policy = load_policy("clairvoyant", iterations=0, first_iterations=30)
@@ -72,7 +72,7 @@ def test_the_schedule_agrees_with_the_simulation(family, seed):
 
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("family", [*FAMILIES, "cfstp"])
-def test_the_search_finds_the_best_plan(family, seed):
+def test_search_finds_the_optimum(family, seed):
     """With two agents and three tasks, no plan is better than the one found."""
     known = described(drawn(family, seed, agents=2, tasks=3))
     count = len(known.tasks)
@@ -84,7 +84,7 @@ def test_the_search_finds_the_best_plan(family, seed):
 
 
 @pytest.mark.parametrize(("agents", "most"), [(20, 35), (40, 10)])
-def test_plans_begin_well_where_tasks_are_due(agents, most):
+def test_initial_plans_meet_most_deadlines(agents, most):
     """A first plan does most tasks in time before any search; with the cheapest put in first, 61 and 19 are undone."""
     known = described(random_cfstp(agents, 300, 1))
     routes, lengths, _ = improved(known, {}, 0, 0, None)
@@ -93,7 +93,7 @@ def test_plans_begin_well_where_tasks_are_due(agents, most):
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-def test_incremental_schedules_equal_full_ones(family):
+def test_incremental_schedules_match_full_schedules(family):
     """Agents not affected by a change keep the schedule that scheduling the whole plan would give."""
     mission = drawn(family, 0, agents=5, tasks=12)
     policy = load_policy("clairvoyant")

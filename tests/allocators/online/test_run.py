@@ -82,13 +82,13 @@ def test_late_orders_are_ignored():
         (Fleet(lambda view: {"a9": STAY}), "gave an order to 'a9', which cannot take orders now"),
     ],
 )
-def test_an_answer_that_is_not_an_order_is_an_error(policy, told):
+def test_invalid_orders_are_errors(policy, told):
     """The error says what the policy returned."""
     with pytest.raises(PolicyError, match=told):
         simulate(TWO, policy)
 
 
-def test_orders_that_cannot_be_followed_are_logged():
+def test_infeasible_orders_are_logged():
     """An order to an unknown task is refused with the reason, and counted."""
     run = simulate(TWO, Answers(lambda view: Order("t7") if view.id == "a1" else None))
     assert run.result.orders_refused == 1
@@ -97,7 +97,7 @@ def test_orders_that_cannot_be_followed_are_logged():
     ]
 
 
-def test_nothing_is_compiled_within_a_mission():
+def test_no_compilation_within_a_mission():
     """Loading `gappo` compiles its loops for the argument types of missions, so the first decision is in time."""
     from alloc.allocators.learned.missions import play, talking
 
@@ -155,7 +155,7 @@ def test_replan_keeps_its_plan_without_events():
     assert result.mission_time <= evaluate(instance, plan.allocation).makespan * (1 + 1e-9)
 
 
-def test_a_price_on_moves_saves_switches():
+def test_move_price_reduces_switches():
     """With a high move price, agents stay with their tasks while new ones appear."""
     mission = random_mission(MissionParameters(agents=4, tasks=6, knowledge="full"), 3)
     free = simulate(mission, "replan", method="greedy", iterations=1).result

@@ -55,7 +55,7 @@ def engine(request: pytest.FixtureRequest, pair: ProcessEngine) -> Iterator[Engi
         yield pair if request.param == "two processes" else engine
 
 
-def test_same_results_in_order(engine: Engine) -> None:
+def test_engines_return_the_results_of_a_loop_in_order(engine: Engine) -> None:
     """Every engine returns what a loop returns, to the last bit."""
     assert engine.map(jobs.square, range(7)) == [0, 1, 4, 9, 16, 25, 36]
     assert engine.map(jobs.square, []) == []
@@ -67,7 +67,7 @@ def test_same_results_in_order(engine: Engine) -> None:
         assert torch.equal(a["weight"], b["weight"])
 
 
-def test_workers_are_kept_until_closed() -> None:
+def test_workers_are_reused_until_closed() -> None:
     """One item needs one process of ten, the next finds it there, and a close, or two, leaves none."""
     with ProcessEngine(10) as engine:
         first, second = engine.map(jobs.pid, [0]), engine.map(jobs.pid, [0])
@@ -77,14 +77,14 @@ def test_workers_are_kept_until_closed() -> None:
     assert gone(first[0], 0.1)
 
 
-def test_workers_import_what_their_items_need() -> None:
+def test_workers_import_only_what_their_items_need() -> None:
     """Torch, which takes seconds, is not loaded in a worker whose items do not use it."""
     with ProcessEngine(1) as engine:
         assert engine.map(eval, ["'torch' in __import__('sys').modules"]) == [False]
 
 
 @pytest.mark.slow
-def test_a_killed_worker_loses_nothing(tmp_path: Path, pair: ProcessEngine) -> None:
+def test_items_of_killed_workers_are_repeated(tmp_path: Path, pair: ProcessEngine) -> None:
     """Items whose process is killed at the first try are done at the second, the others go on undisturbed."""
     items = [(number, str(tmp_path / str(number))) for number in range(4)]
     results = pair.map(jobs.die_first, items)
@@ -93,7 +93,7 @@ def test_a_killed_worker_loses_nothing(tmp_path: Path, pair: ProcessEngine) -> N
     assert len(list(tmp_path.iterdir())) == 2
 
 
-def test_an_item_that_always_kills_is_given_up(tmp_path: Path) -> None:
+def test_item_that_always_kills_its_worker_is_an_error(tmp_path: Path) -> None:
     """After the last try there is one error; what is killed while idle costs no try; the engine goes on."""
     with ProcessEngine(1, max_attempts=2) as engine:
         with pytest.raises(EngineError, match=r"died 2 times .* \(exit code -9\)"):
@@ -108,7 +108,7 @@ def test_an_item_that_always_kills_is_given_up(tmp_path: Path) -> None:
         assert engine.map(jobs.square, [3]) == [9]
 
 
-def test_errors_of_the_function_are_raised_here(engine: Engine) -> None:
+def test_exceptions_of_the_function_are_raised_in_the_caller(engine: Engine) -> None:
     """They keep their type, and tell where in the worker they arose."""
     with pytest.raises(KeyError, match="item 5") as caught:
         engine.map(jobs.fail, [5])
@@ -119,7 +119,7 @@ def test_errors_of_the_function_are_raised_here(engine: Engine) -> None:
 
 
 @pytest.mark.slow
-def test_a_stop_drops_what_is_under_work(tmp_path: Path, pair: ProcessEngine) -> None:
+def test_stop_request_drops_items_in_progress(tmp_path: Path, pair: ProcessEngine) -> None:
     """`map` returns None at once, its workers are gone, and the engine can be used again."""
     markers = [tmp_path / name for name in ("a", "b")]
     assert pair.map(jobs.sleep_long, [str(marker) for marker in markers], when_written(*markers)) is None
@@ -127,7 +127,7 @@ def test_a_stop_drops_what_is_under_work(tmp_path: Path, pair: ProcessEngine) ->
     assert pair.map(jobs.square, [3]) == [9]
 
 
-def test_the_serial_engine_stops_between_items() -> None:
+def test_serial_engine_stops_between_items() -> None:
     """It is asked before every item."""
     answers = iter([False, False, True])
     assert SerialEngine().map(jobs.square, range(9), lambda: next(answers)) is None
@@ -146,7 +146,7 @@ if __name__ == "__main__":
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL], ids=lambda number: number.name)
-def test_no_orphans(number: signal.Signals, tmp_path: Path) -> None:
+def test_no_orphaned_workers(number: signal.Signals, tmp_path: Path) -> None:
     """Ctrl-C of a whole process group, SIGTERM and even SIGKILL of the parent end the workers; the first two tidily."""
     script, markers = tmp_path / "script.py", [tmp_path / name for name in ("a", "b")]
     script.write_text(SCRIPT)
@@ -173,7 +173,7 @@ def test_no_orphans(number: signal.Signals, tmp_path: Path) -> None:
         assert (output, parent.returncode) == ("None\n", 0)
 
 
-def test_ctrl_c_while_workers_start_does_not_reach_them() -> None:
+def test_ctrl_c_does_not_reach_starting_workers() -> None:
     """Half a process cannot handle a signal, so it never gets one: the worker comes up and does its item."""
     results: list[list[int] | None] = []
     with ProcessEngine(1) as engine:
@@ -188,7 +188,7 @@ def test_ctrl_c_while_workers_start_does_not_reach_them() -> None:
     assert results == [[9]]
 
 
-def test_make_engine_refuses_what_does_not_fit() -> None:
+def test_make_engine_refuses_invalid_options() -> None:
     """Each mistake is one line that names its option."""
     assert isinstance(make_engine(), SerialEngine)
     with make_engine("processes", workers=2) as engine:

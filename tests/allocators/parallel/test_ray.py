@@ -32,7 +32,7 @@ pytestmark = [
 ]
 
 
-def test_without_ray_the_mend_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_missing_ray_names_the_package(monkeypatch: pytest.MonkeyPatch) -> None:
     """One line says what to install."""
     monkeypatch.setitem(sys.modules, "ray", None)
     with pytest.raises(InputError, match=r"engine: Ray is not installed: pip install 'alloc-mrta\[cluster\]'"):
@@ -41,7 +41,7 @@ def test_without_ray_the_mend_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.needs("ray")
 @pytest.mark.parametrize("address", ["127.0.0.1:1", "nowhere.invalid:6379", "ray://127.0.0.1:1", "1.2.3.4:99999", "x"])
-def test_nobody_there(address: str) -> None:
+def test_address_without_a_cluster_is_reported_at_once(address: str) -> None:
     """An address where no cluster is, is told at once, where Ray itself tries for minutes."""
     began = time.monotonic()
     with pytest.raises(InputError, match=f"address: no Ray cluster at '{address}': "):
@@ -50,7 +50,7 @@ def test_nobody_there(address: str) -> None:
 
 
 @pytest.mark.needs("ray")
-def test_a_cluster_that_cannot_be_joined(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_errors_of_ray_on_joining_are_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     """What Ray says against it is told, the versions in its later lines too."""
     import ray
 
@@ -78,7 +78,7 @@ def engine(cluster: Any) -> Iterator[Engine]:
 
 @pytest.mark.needs("ray")
 @pytest.mark.slow
-def test_same_results_in_order(engine: Engine) -> None:
+def test_cluster_returns_the_results_of_a_loop_in_order(engine: Engine) -> None:
     """A cluster returns what this process returns, to the last bit, and raises what it raises."""
     assert engine.map(jobs.square, range(5)) == [0, 1, 4, 9, 16]
     states = [{"seed": torch.tensor(seed), "weight": torch.full((40, 40), 0.1 * seed)} for seed in range(3)]
@@ -94,7 +94,7 @@ def test_same_results_in_order(engine: Engine) -> None:
 
 @pytest.mark.needs("ray")
 @pytest.mark.slow
-def test_more_threads_than_processors(cluster: Any, engine: Engine) -> None:
+def test_more_threads_than_processors_are_refused(cluster: Any, engine: Engine) -> None:
     """What no machine can ever do is told at once, where Ray waits forever; the connection is still there."""
     with pytest.raises(InputError, match=r"threads: no machine of the cluster has 2 processors; the largest has 1"):
         make_engine("ray", address=cluster.address, threads=2)
@@ -103,7 +103,7 @@ def test_more_threads_than_processors(cluster: Any, engine: Engine) -> None:
 
 @pytest.mark.needs("ray")
 @pytest.mark.slow
-def test_a_killed_worker_loses_nothing(engine: Engine, tmp_path: Path) -> None:
+def test_items_of_killed_workers_are_repeated(engine: Engine, tmp_path: Path) -> None:
     """Items whose process is killed at the first try are done at the next."""
     results = engine.map(jobs.die_first, [(number, str(tmp_path / str(number))) for number in range(4)])
     assert results is not None
@@ -112,7 +112,7 @@ def test_a_killed_worker_loses_nothing(engine: Engine, tmp_path: Path) -> None:
 
 @pytest.mark.needs("ray")
 @pytest.mark.slow
-def test_an_item_that_always_kills_is_given_up(cluster: Any, engine: Engine, tmp_path: Path) -> None:
+def test_item_that_always_kills_its_worker_is_an_error(cluster: Any, engine: Engine, tmp_path: Path) -> None:
     """After the last try there is one error, and an engine that finds a connection leaves it open."""
     with make_engine("ray", address=cluster.address) as second:
         second._task = second._task.options(max_retries=1)
@@ -123,7 +123,7 @@ def test_an_item_that_always_kills_is_given_up(cluster: Any, engine: Engine, tmp
 
 @pytest.mark.needs("ray")
 @pytest.mark.slow
-def test_a_broken_connection_is_an_error_of_the_engine(engine: Engine, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_broken_connection_is_an_engine_error(engine: Engine, monkeypatch: pytest.MonkeyPatch) -> None:
     """It is told as one of Ray, after which a training can be resumed, not as one of a file."""
 
     def reset(_: object) -> None:
@@ -139,7 +139,7 @@ def test_a_broken_connection_is_an_error_of_the_engine(engine: Engine, monkeypat
 
 @pytest.mark.needs("ray")
 @pytest.mark.slow
-def test_a_stop_drops_what_is_under_work(engine: Engine, tmp_path: Path) -> None:
+def test_stop_request_drops_items_in_progress(engine: Engine, tmp_path: Path) -> None:
     """`map` returns None, and the processors are free for the next items."""
     markers = [tmp_path / name for name in ("a", "b")]
     stopped = engine.map(jobs.sleep_long, [str(m) for m in markers], lambda: all(m.exists() for m in markers))
@@ -149,7 +149,7 @@ def test_a_stop_drops_what_is_under_work(engine: Engine, tmp_path: Path) -> None
 
 @pytest.mark.needs("ray")
 @pytest.mark.slow
-def test_a_machine_dies_and_nothing_is_lost(cluster: Any, engine: Engine, tmp_path: Path) -> None:
+def test_items_of_a_dead_machine_are_repeated(cluster: Any, engine: Engine, tmp_path: Path) -> None:
     """One of three machines is killed with an item under work; every result arrives, and is right."""
     add_machine(cluster)
     items = [(number, str(tmp_path)) for number in range(6)]
@@ -226,7 +226,7 @@ def assert_same_end(policy: Path, expected: Path) -> None:
 @pytest.mark.needs("ray")
 @pytest.mark.slow
 @pytest.mark.timeout(300)
-def test_a_machine_dies_in_a_training(cluster: Any, options: list[str], undisturbed: Path, tmp_path: Path) -> None:
+def test_training_survives_a_dead_machine(cluster: Any, options: list[str], undisturbed: Path, tmp_path: Path) -> None:
     """The member that a killed machine trained is trained again on another, without any action of the user."""
     add_machine(cluster)
     before, policy = living(cluster), tmp_path / "p"
@@ -249,7 +249,7 @@ def test_a_machine_dies_in_a_training(cluster: Any, options: list[str], undistur
 @pytest.mark.needs("ray")
 @pytest.mark.slow
 @pytest.mark.timeout(300)
-def test_a_killed_training_is_resumed(cluster: Any, options: list[str], undisturbed: Path, tmp_path: Path) -> None:
+def test_killed_training_is_resumed(cluster: Any, options: list[str], undisturbed: Path, tmp_path: Path) -> None:
     """After kill -9 the cluster is free for the next command, which goes on where the checkpoint stands."""
     policy = tmp_path / "p"
     with training(cluster, *options, "--output", str(policy)) as process:

@@ -44,7 +44,7 @@ def test_csv_has_a_row_per_agent(tmp_path: Path) -> None:
     assert float(rows[0]["distance"]) == agent_rows(result)[0].distance
 
 
-def test_a_workbook_has_three_sheets(tmp_path: Path) -> None:
+def test_workbook_has_three_sheets(tmp_path: Path) -> None:
     """Summary, tasks and agents; numbers are numbers, headings have units, and a name is never a formula."""
     write_result(planned(earth(), [0, 0, -1]), tmp_path / "plan.xlsx")
     book = load_workbook(tmp_path / "plan.xlsx")
@@ -96,7 +96,7 @@ def test_json_is_read_back(tmp_path: Path) -> None:
         (Instance(ability=[1] * 20_001, workload=[1], task_position=[[0, 0]]), "plan.html", "at most 20000 agents"),
     ],
 )
-def test_what_cannot_be_written_is_refused(tmp_path: Path, instance: Instance, name: str, message: str) -> None:
+def test_unsupported_files_are_refused(tmp_path: Path, instance: Instance, name: str, message: str) -> None:
     """Another suffix, and a map without places, are an error that names the file; nothing is left behind."""
     with pytest.raises(InputError) as caught:
         write_result(planned(instance, [0] * instance.n), tmp_path / name)
@@ -105,7 +105,7 @@ def test_what_cannot_be_written_is_refused(tmp_path: Path, instance: Instance, n
     assert not list(tmp_path.iterdir())
 
 
-def test_a_workbook_needs_its_package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_workbook_needs_openpyxl(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Without openpyxl the error says what to install."""
     monkeypatch.setattr("alloc.allocators.plan.files.find_spec", lambda _: None)
     with pytest.raises(MissingPackageError, match=r"alloc-mrta\[tables\]"):

@@ -38,7 +38,7 @@ def page(tmp_path: Path) -> Path:
     return tmp_path / "plan.html"
 
 
-def test_the_page_needs_nothing_else(page: Path) -> None:
+def test_page_is_self_contained(page: Path) -> None:
     """There is one file without links, whose policy forbids to load anything, and names are data, never markup."""
     text = page.read_text(encoding="utf-8")
     assert re.findall(r"""(?:src|href)=["']?([^"'>\\s]+)""", text.replace("src=x", "")) == ["data:,"]
@@ -50,7 +50,7 @@ def test_the_page_needs_nothing_else(page: Path) -> None:
     assert json.loads(embedded[1]) == json.loads(json.dumps(document(planned(harbour(), [0, 1, 1, -1]))))
 
 
-def test_the_plan_in_the_page() -> None:
+def test_page_contains_the_plan() -> None:
     """Places lie from 0 to 1000, south below; bases have names, and figures are text under their headings."""
     plan = document(planned(harbour(), [0, 1, 1, -1]))
     tasks, agents, bases = (plan[name] for name in ("tasks", "agents", "bases"))
@@ -63,7 +63,7 @@ def test_the_plan_in_the_page() -> None:
     assert tasks[1]["cells"] == ["t2", "4", "1.333", "2"]
 
 
-def test_equal_times_have_no_shades() -> None:
+def test_equal_times_have_one_shade() -> None:
     """Where all tasks are done together no task is drawn as late."""
     plan = document(planned(harbour(workload=[1, 3, 1]), [0, 1, 1, 2]))
     assert [task["late"] for task in plan["tasks"]] == [None] * 3
@@ -98,7 +98,7 @@ document.body.replaceChildren(JSON.stringify(out));
 
 
 @needs_browser
-def test_a_browser_zooms_filters_and_names(page: Path, tmp_path: Path) -> None:
+def test_page_zooms_filters_and_shows_names(page: Path, tmp_path: Path) -> None:
     """Two moves, two bases, three tasks; zooming moves them, filters and the search hide them, hovering names them."""
     assert run_in_browser(page, SCRIPT, tmp_path) == [2, 2, 3, 3, True, 0, 1, 1, 2, 0, 1, "task: t2", 5, 0]
 
@@ -124,7 +124,7 @@ WHITE, BLACK = "rgb(255, 255, 255)", "rgb(34, 34, 34)"
     ("size", "flags", "colours"),
     [("500,900", [], [WHITE, BLACK]), ("1200,800", ["--force-dark-mode"], ["rgb(20, 24, 28)", "rgb(230, 233, 236)"])],
 )
-def test_the_map_is_legible_on_a_phone_and_in_the_dark(
+def test_map_is_legible_on_phones_and_in_dark_mode(
     page: Path, tmp_path: Path, size: str, flags: list[str], colours: list[str]
 ) -> None:
     """The map takes most of the height, fits the width, nothing is under the legend, and all text contrasts with it."""

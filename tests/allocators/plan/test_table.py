@@ -29,7 +29,7 @@ def planned(instance: Instance, plan: list[int]) -> Result:
     return scored_result(instance, Allocation(plan))
 
 
-def test_an_agent_has_its_whole_flight() -> None:
+def test_row_of_an_agent_includes_its_whole_flight() -> None:
     """It arrives after the way there; distance, energy and battery count the way back too."""
     row, other = agent_rows(planned(fleet(), [0, 1]))
     assert (row.agent, row.task, row.arrival, row.completion_time) == ("a1", "t1", 2.0, 4.0)
@@ -37,7 +37,7 @@ def test_an_agent_has_its_whole_flight() -> None:
     assert (other.arrival, other.distance, other.battery, other.battery_left) == (0.0, 0.0, None, None)
 
 
-def test_idle_agents_and_those_that_cannot_go_do_nothing() -> None:
+def test_idle_and_infeasible_agents_do_not_fly() -> None:
     """Neither flies; the second says why, and is in no group."""
     result = planned(fleet(battery=[5, 9]), [0, -1])
     barred, idle = agent_rows(result)
@@ -48,7 +48,7 @@ def test_idle_agents_and_those_that_cannot_go_do_nothing() -> None:
 
 
 @pytest.mark.parametrize("seed", range(40))
-def test_rows_add_up_to_the_scores(seed: int) -> None:
+def test_rows_sum_to_the_scores(seed: int) -> None:
     """Over all kinds of instances: distances and energies of agents, and times of tasks, are those of `evaluate`."""
     instance = varied_instance(seed)
     result = planned(instance, np.random.default_rng(seed).integers(-1, instance.m, instance.n).tolist())
@@ -63,7 +63,7 @@ def test_rows_add_up_to_the_scores(seed: int) -> None:
     assert sorted(groups) == sorted(row.agent for row in rows if row.arrival is not None)
 
 
-def test_columns_have_units_and_say_something() -> None:
+def test_columns_have_units_and_are_informative() -> None:
     """Headings have the units of the instance; what is the same for all by nature has no column."""
     units = Units(time="h", distance="km", energy="kWh", work="m2")
     headings = [column.heading for column in agent_columns(fleet(units=units))]
@@ -76,7 +76,7 @@ def test_columns_have_units_and_say_something() -> None:
     assert "priority" in [column.heading for column in task_columns(fleet(priority=[1, 2]))]
 
 
-def test_rows_say_where_agents_return_to() -> None:
+def test_rows_name_the_bases_of_return() -> None:
     """The flight ends at the base that the row names; the column is there where somebody returns to a base."""
     instance = fleet(bases={"harbour": (3, 4)}, return_base=[0, -1])
     row, other = agent_rows(planned(instance, [0, 1]))
@@ -87,7 +87,7 @@ def test_rows_say_where_agents_return_to() -> None:
     assert "returns to" not in [column.heading for column in agent_columns(fleet())]
 
 
-def test_some_rows_are_those_of_all() -> None:
+def test_selected_rows_match_all_rows() -> None:
     """Rows of chosen agents and tasks are those that they have among all."""
     result = planned(fleet(), [0, 1])
     assert agent_rows(result, np.array([1])) == agent_rows(result)[1:]

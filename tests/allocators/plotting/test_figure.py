@@ -30,7 +30,7 @@ def test_sites_and_times_are_drawn(small):
     assert {text.get_text() for text in sites.texts} >= {"t1", "t2", "t3"}
 
 
-def test_without_positions_times_alone_are_drawn():
+def test_only_times_are_drawn_without_positions():
     """An instance that knows no places has bars only."""
     (times,) = axes_of(Instance(ability=[1, 2], workload=[1, 0]))
     assert len(times.patches) == 2
@@ -63,7 +63,7 @@ def test_odd_instances_are_drawn(more):
     assert figure.axes
 
 
-def test_many_tasks_are_drawn_upright_without_names():
+def test_many_tasks_are_drawn_as_vertical_bars_without_names():
     """Beyond 40 tasks the bars stand, and beyond 60 nothing is named."""
     rng = np.random.default_rng(0)
     sites, times = axes_of(Instance(ability=np.ones(300), workload=np.ones(200), task_position=rng.random((200, 3))))
@@ -71,7 +71,7 @@ def test_many_tasks_are_drawn_upright_without_names():
     assert len(sites.texts) == 0
 
 
-def test_flows_are_gathered_by_place_and_task():
+def test_flows_are_grouped_by_place_and_task():
     """Agents with the same way are one flow; who stays, is idle or comes from nowhere is none."""
     instance = Instance(
         ability=[1] * 5,
@@ -88,13 +88,13 @@ def test_flows_are_gathered_by_place_and_task():
     assert shape[0, 1] == -shape[2, 1] > 0
 
 
-def test_the_two_axes_spread_the_most():
+def test_two_axes_of_largest_spread_are_drawn():
     """A world that is flat along y is seen from that side."""
     instance = Instance(ability=[1], workload=[1, 1], task_position=[[0, 0, 0], [1, 0.1, 2]])
     assert two_axes(instance) == (0, 2)
 
 
-def test_labels_keep_clear_of_each_other_and_of_circles():
+def test_labels_do_not_overlap_each_other_or_circles():
     """A name goes to another side, or is left out, rather than cover anything; the largest circle chooses first."""
     centre = np.array([[0.0, 0.0], [0.0, 12.0], [np.nan, np.nan]])
     radius, width = np.array([10.0, 4.0, 3.0]), np.array([10.0, 10.0, 10.0])
@@ -106,7 +106,7 @@ def test_labels_keep_clear_of_each_other_and_of_circles():
     assert visible(np.zeros((2, 2)), radius[:2], 3.0).tolist() == [False, True]
 
 
-def test_labels_keep_clear_of_moves():
+def test_labels_avoid_moves():
     """A name goes to the first side that no move crosses; where moves go all ways, to that which fewest cross."""
     centre, radius, width = np.zeros((1, 2)), np.array([4.0]), np.array([10.0])
     up = [[0.0, 0.0], [0.0, 60.0]]
@@ -117,13 +117,13 @@ def test_labels_keep_clear_of_moves():
     assert not np.isnan(crowded).any()
 
 
-def test_names_of_every_script_on_one_line():
+def test_names_in_any_script_are_drawn_on_one_line():
     """Glyphs that the font lacks and line breaks in names harm nothing: each label is one line."""
     (times,) = axes_of(Instance(name="two\nlines", task_ids=["日本", "a\nb"], ability=[1, 2], workload=[1, 2]))
     assert {label.get_text() for label in times.get_yticklabels()} == {"日本", "a b"}
 
 
-def test_very_many_agents_and_tasks_are_drawn_by_a_sample():
+def test_very_large_instances_are_drawn_by_a_sample():
     """Beyond what can be told apart on paper, dots and wedges are of some agents, and lines stand for the tasks."""
     instance = random_instance(Family(agents=30_000, tasks=1_200, starts="own"), 0)
     figure = plot(solve(instance, "greedy"))
@@ -192,7 +192,7 @@ def test_bases_are_named_with_counts():
     ]
 
 
-def test_nameless_bases_list_few_agents():
+def test_unnamed_bases_list_few_agents():
     """Where ids share nothing, a base of a small fleet has the names of its agents, in a large one a number."""
     sites, _ = axes_of(fleet(agent_ids=["ann", "ben", "cid", "dan"]))
     assert "ann, ben, cid" in {text.get_text() for text in sites.texts}
@@ -214,7 +214,7 @@ def test_bars_name_their_groups():
 @pytest.mark.parametrize(
     ("longest", "text"), [(30, "ann, ben, cid, dora"), (15, "ann and 3 more"), (12, "4 agents"), (5, "")]
 )
-def test_groups_are_cut_to_their_bars(longest, text):
+def test_group_labels_fit_their_bars(longest, text):
     """A bar holds as many names as fit, else the number of agents, else nothing."""
     assert listed(["ann", "ben", "cid", "dora"], longest) == text
 
@@ -230,13 +230,13 @@ def test_units_are_on_the_axes():
     assert (sites.get_xlabel(), times.get_xlabel()) == ("x", "completion time")
 
 
-def test_colours_have_a_scale_where_they_differ():
+def test_colour_bar_is_drawn_if_times_differ():
     """The colour bar is there if tasks are done at different times, and not where all are done together."""
     scales = [plot(planned(fleet(), plan)).axes[0].child_axes for plan in ([0, 1, 1, 1], [0, 1, 1, -1])]
     assert [len(found) for found in scales] == [1, 0]
 
 
-def test_the_earth_keeps_its_shape():
+def test_geographic_maps_keep_their_shape():
     """Near 60 degrees north a degree of latitude is drawn twice as long as one of longitude, also at the date line."""
     instance = fleet(
         metric="geographic",
@@ -251,7 +251,7 @@ def test_the_earth_keeps_its_shape():
     assert sites.xaxis.get_major_formatter()(181) == "-179"
 
 
-def test_long_names_stay_different():
+def test_long_names_remain_distinct():
     """Names that begin alike are not shortened to the same label."""
     ids = [f"inspection of the southern pylon {number}" for number in (1, 2)]
     _, times = axes_of(fleet(task_ids=ids))

@@ -15,6 +15,6 @@ from alloc.allocators.plotting.front import log_ticks
         (0.9, 1.3e9, [10, 1000, 1e5, 1e7, 1e9]),
     ],
 )
-def test_numbers_of_an_axis_are_round_and_few(low: float, high: float, ticks: list[float]) -> None:
+def test_axis_ticks_are_round_and_few(low: float, high: float, ticks: list[float]) -> None:
     """A short axis has more than one or two numbers, a long one no more than there is room for."""
     assert log_ticks(low, high) == pytest.approx(ticks)

@@ -268,14 +268,14 @@ def difference(name: str, path: Path) -> str | None:
 
 @pytest.mark.skipif(matplotlib.__version_info__ < (3, 11), reason="text of matplotlib before 3.11 has another size")
 @pytest.mark.parametrize("name", DRAWN)
-def test_picture_is_the_one_that_was_looked_at(tmp_path: Path, name: str) -> None:
+def test_picture_matches_the_reference_picture(tmp_path: Path, name: str) -> None:
     """The picture differs from the kept one by less than a wrong one does."""
     DRAWN[name](str(tmp_path / f"{name}.png"))
     wrong = difference(name, reduced(tmp_path / f"{name}.png"))
     assert wrong is None, wrong
 
 
-def test_every_kept_picture_is_drawn() -> None:
+def test_every_reference_picture_is_drawn() -> None:
     """No picture is kept that nothing is compared with."""
     assert {path.stem for path in KEPT.glob("*.png")} == set(DRAWN)
 
@@ -335,7 +335,7 @@ WRONG: dict[str, tuple[str, Callable[[str], object]]] = {
 
 @pytest.mark.slow  # all of them test the test before
 @pytest.mark.parametrize("what", WRONG)
-def test_a_wrong_picture_is_noticed(tmp_path: Path, what: str) -> None:
+def test_wrong_picture_is_detected(tmp_path: Path, what: str) -> None:
     """A picture of another plan, bound or front is not taken for the one that is kept."""
     name, draw = WRONG[what]
     draw(str(tmp_path / "wrong.png"))

@@ -25,7 +25,7 @@ def drawn(agents: int, tasks: int, seed: int = 1) -> Instance:
 
 
 @pytest.mark.parametrize("method", ["local-search", "ga", "lp-round"])
-def test_ends_with_the_optimum(method: str) -> None:
+def test_run_ends_with_a_proven_optimum(method: str) -> None:
     """With minutes to go, a run on five agents ends at once, and its plan is proven best in both objectives."""
     instance = drawn(5, 3)
     result = solve(instance, method, objective=BOTH, time_limit_s=300.0)
@@ -35,7 +35,7 @@ def test_ends_with_the_optimum(method: str) -> None:
     assert result.runtime_s < 30
 
 
-def test_ends_without_energy() -> None:
+def test_run_ends_with_a_proven_makespan() -> None:
     """Where the simple bound on the makespan leaves a gap, too."""
     instance = Instance(ability=[3.1, 2.3, 2.2], workload=[3, 3])
     result = solve(instance, "local-search", time_limit_s=300.0)
@@ -45,7 +45,9 @@ def test_ends_without_energy() -> None:
 
 @pytest.mark.parametrize("shape", [(5, 3), (14, 14)])
 @pytest.mark.parametrize("method", ["local-search", "ga"])
-def test_counted_runs_keep_their_answers(method: str, shape: tuple[int, int], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_runs_with_iteration_limits_keep_their_answers(
+    method: str, shape: tuple[int, int], monkeypatch: pytest.MonkeyPatch
+) -> None:
     """With iterations and a seed, the plan is the one that the run finds without the proof."""
 
     def plan() -> Allocation | None:
@@ -56,7 +58,7 @@ def test_counted_runs_keep_their_answers(method: str, shape: tuple[int, int], mo
     assert plan() == ended
 
 
-def test_a_task_for_each_agent_is_proven_by_a_linear_programme() -> None:
+def test_matching_optimum_is_proven_by_a_linear_programme() -> None:
     """Its optimum is a matching, which a linear programme finds: the run ends with it among fourteen tasks."""
     tasks = np.random.default_rng(0).random((14, 2))
     instance = Instance(ability=np.ones(14), workload=np.ones(14), task_position=tasks, agent_position=tasks + 0.01)
@@ -69,7 +71,7 @@ def test_a_task_for_each_agent_is_proven_by_a_linear_programme() -> None:
     assert EarlyProof(Search(instance, BOTH, Budget(None), start=Allocation(np.arange(14)))).hours == proof.hours
 
 
-def test_a_start_may_be_proven() -> None:
+def test_optimal_warm_start_is_proven() -> None:
     """A run that begins with the best plan ends before it does anything."""
     instance = drawn(5, 3)
     best = Search(instance, BOTH, Budget(None), start=Allocation(np.array(brute_force(instance).plan)))
@@ -77,7 +79,7 @@ def test_a_start_may_be_proven() -> None:
     assert best.stop_reason() is StopReason.PROVEN
 
 
-def test_after_short_runs_nothing_is_proven() -> None:
+def test_short_runs_skip_the_proof() -> None:
     """Within a tenth of a second there is no time for bounds: the run has the simple ones alone."""
     result = solve(drawn(5, 3), "local-search", objective=BOTH, time_limit_s=0.05)
     assert result.stop_reason is StopReason.TIME_LIMIT

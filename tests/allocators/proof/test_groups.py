@@ -12,7 +12,7 @@ from alloc.problems import Instance
 
 
 @pytest.mark.parametrize("seed", range(60))
-def test_is_the_optimum_by_brute_force(seed: int) -> None:
+def test_optimum_matches_brute_force(seed: int) -> None:
     """Makespan and energy are those of the best of all plans, with lists, limits, travel times and idle tasks."""
     instance = tiny_instance(seed)
     best, found = brute_force(instance), optimum(instance, EXACT)
@@ -24,7 +24,7 @@ def test_is_the_optimum_by_brute_force(seed: int) -> None:
         assert found.cost <= best.energy
 
 
-def test_slack_lets_energy_decide() -> None:
+def test_cheapest_plan_within_slack_is_best() -> None:
     """With half as much time again, the cost is the least of all plans within that."""
     instance = next(one for one in map(tiny_instance, range(60)) if brute_force(one).energy > 1 and one.n > 3)
     found = optimum(instance, MakespanTolerance(0.5))
@@ -32,7 +32,7 @@ def test_slack_lets_energy_decide() -> None:
     assert found.cost == pytest.approx(least_energy_within(instance, 1.5 * found.hours), rel=1e-9)
 
 
-def test_size_decides() -> None:
+def test_size_determines_whether_groups_are_enumerated() -> None:
     """A dozen agents are few for one task, and too many for ten."""
     assert is_tiny(Instance(ability=np.ones(12), workload=[1]))
     assert not is_tiny(Instance(ability=np.ones(12), workload=np.ones(10)))

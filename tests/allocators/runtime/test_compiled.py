@@ -25,7 +25,7 @@ def summed(added):
     return total
 
 
-def test_constants_and_small_integers_share_what_is_compiled():
+def test_constants_and_small_integers_share_a_specialisation():
     """A variable that is 0 at first, a constant, and integers of 32 bits: one function does for all, with their sum."""
     added = module._compiled_once(numba.njit(add))
     total = summed(added)
@@ -34,7 +34,7 @@ def test_constants_and_small_integers_share_what_is_compiled():
     assert [str(one) for one in added.signatures] == ["(int64, int64)"]
 
 
-def test_what_is_compiled_shares():
+def test_decorated_loops_share_specialisations():
     """The decorator that all loops have makes them share, also where their machine code comes from the cache."""
     added = compiled(add)
     assert "get_call_template" in vars(added)
@@ -58,13 +58,13 @@ class Fixed:
 
 
 @pytest.mark.parametrize("function", [Changed(), Fixed(), object()])
-def test_another_numba_is_left_as_it_is(function):
+def test_unknown_numba_versions_are_not_patched(function):
     """Where the place in numba that is replaced is not as it was, a function stays what it is."""
     assert module._compiled_once(function) is function
     assert "get_call_template" not in getattr(function, "__dict__", {})
 
 
-def test_loops_that_share_nothing_do_the_same(monkeypatch):
+def test_loops_without_sharing_give_the_same_results(monkeypatch):
     """Without that place each caller has loops compiled for it, with the same sums."""
     monkeypatch.setattr(module, "CALL_TEMPLATE_PARAMETERS", ["of another numba"])
     added = module._compiled_once(numba.njit(add))

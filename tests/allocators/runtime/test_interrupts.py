@@ -22,7 +22,7 @@ def test_signals_set_the_event(number: signal.Signals) -> None:
     assert signal.getsignal(number) is before
 
 
-def test_a_second_interrupt_gets_through() -> None:
+def test_second_interrupt_is_not_caught() -> None:
     """A second signal interrupts at once."""
 
     def insist() -> None:
@@ -37,7 +37,7 @@ def test_a_second_interrupt_gets_through() -> None:
         insist()
 
 
-def test_other_threads_leave_signals_alone() -> None:
+def test_other_threads_install_no_signal_handlers() -> None:
     """Outside the main thread, where Python allows no handlers, nothing is set up."""
     seen = []
 
@@ -51,7 +51,7 @@ def test_other_threads_leave_signals_alone() -> None:
     assert seen == [signal.getsignal(signal.SIGINT)]
 
 
-def test_native_work_answers_or_raises() -> None:
+def test_native_work_returns_or_raises() -> None:
     """Its result is returned, its exception raised here."""
     assert run_native(lambda: 7, lambda: False, lambda: None) == 7
 
@@ -73,7 +73,7 @@ def test_native_work_is_halted() -> None:
     assert run_native(work, lambda: True, halted.set) == "best so far"
 
 
-def test_native_work_that_does_not_stop_is_abandoned() -> None:
+def test_unresponsive_native_work_is_abandoned() -> None:
     """A solver that does not stop delays the run by a fraction of a second only."""
     release, begin = threading.Event(), time.monotonic()
     assert run_native(lambda: release.wait(10), lambda: True, lambda: None) is None
@@ -84,7 +84,7 @@ def test_native_work_that_does_not_stop_is_abandoned() -> None:
     assert not abandoned_threads()
 
 
-def test_native_work_is_halted_by_an_exception_of_a_handler() -> None:
+def test_exception_in_a_handler_halts_native_work() -> None:
     """A KeyboardInterrupt in the calling thread leaves no solver running."""
     halted = threading.Event()
 
@@ -110,7 +110,7 @@ print("over", flush=True)
 """
 
 
-def test_the_exit_of_the_process_waits_for_abandoned_threads() -> None:
+def test_process_exit_waits_for_abandoned_threads() -> None:
     """A solver that calls back into an interpreter that has ended would crash a program that embeds us."""
     ran = subprocess.run([sys.executable, "-c", PROGRAM], capture_output=True, text=True, timeout=30)
     assert (ran.returncode, ran.stdout.split("\n"), ran.stderr) == (0, ["over", "calls back", ""], "")

@@ -3,7 +3,7 @@ import numpy as np
 from alloc.allocators.runtime.random import draw
 
 
-def test_draws_are_even():
+def test_draws_are_uniform_and_reproducible():
     """Random numbers cover their range evenly, and the same state gives the same ones."""
     state = np.array([12345], dtype=np.uint64)
     drawn = [draw(state, 7) for _ in range(7000)]

@@ -46,7 +46,7 @@ def runs(monkeypatch: pytest.MonkeyPatch) -> list[FineTuning]:
 
 @pytest.mark.parametrize("method", LEARNED)
 @pytest.mark.parametrize("context", CONTEXTS)
-def test_the_callers_torch_changes_no_answer(method: str, context: str) -> None:
+def test_torch_settings_of_the_caller_change_no_answer(method: str, context: str) -> None:
     """Loaded and run within such a context, a method answers as it does without."""
     run = partial(solve, paper_like(24, 6, 100, 0), objective="makespan-energy", time_limit_s=None, iterations=5)
     plain = run(load(method))
@@ -58,7 +58,7 @@ def test_the_callers_torch_changes_no_answer(method: str, context: str) -> None:
 
 
 @pytest.mark.parametrize("context", CONTEXTS)
-def test_learning_on_works_in_the_callers_torch(context: str, runs: list[FineTuning]) -> None:
+def test_fine_tuning_works_with_torch_settings_of_the_caller(context: str, runs: list[FineTuning]) -> None:
     """Gradients are had, and in full precision, though the caller wants none."""
     with CONTEXTS[context]():
         result = solve(paper_like(24, 6, 100, 0), "gappo", objective="makespan-energy", time_limit_s=1.0)
@@ -66,7 +66,7 @@ def test_learning_on_works_in_the_callers_torch(context: str, runs: list[FineTun
     assert runs[0].jobs > 0
 
 
-def test_a_failure_in_learning_on_costs_no_plan(
+def test_failing_fine_tuning_keeps_the_plan(
     runs: list[FineTuning], monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     """The run goes on to its end with the policy as shipped, a note says what happened, and the log where."""
@@ -82,7 +82,7 @@ def test_a_failure_in_learning_on_costs_no_plan(
     assert (record.name, record.exc_info is not None) == ("alloc", True)
 
 
-def test_threads_are_those_of_the_calling_thread() -> None:
+def test_torch_state_is_restored_in_every_thread() -> None:
     """Runs that overlap leave every thread with what it had, and others see nothing of it meanwhile."""
     seen: list[int] = []
     first_in, second_in, first_out = threading.Event(), threading.Event(), threading.Event()
@@ -120,7 +120,7 @@ def test_threads_are_those_of_the_calling_thread() -> None:
 
 
 @pytest.mark.parametrize("learner", [Ppo, A2c, Dqn, Ddpg])
-def test_first_weights_are_torchs_own(learner: Callable[..., Ppo]) -> None:
+def test_initial_weights_match_torch(learner: Callable[..., Ppo]) -> None:
     """First weights are those that the layers draw after `manual_seed`, but no shared generator is drawn from."""
     size = NetworkSize(8, 8, 2)
     before = torch.get_rng_state()
@@ -133,7 +133,7 @@ def test_first_weights_are_torchs_own(learner: Callable[..., Ppo]) -> None:
     assert all(torch.equal(made[name], expected[name]) for name in expected)
 
 
-def test_tensors_made_within_are_plain() -> None:
+def test_tensors_in_plain_torch_are_trainable_cpu_tensors() -> None:
     """What is made in `plain_torch` can be trained and is on the CPU, whatever the caller has set."""
     with torch.inference_mode(), torch.device("meta"), plain_torch():
         weights = Ppo(NetworkSize(8, 8, 2), seed=3).policy.state_dict()
@@ -141,7 +141,7 @@ def test_tensors_made_within_are_plain() -> None:
 
 
 @pytest.mark.parametrize("method", LEARNED)
-def test_loading_draws_from_no_shared_generator(method: str) -> None:
+def test_shared_generators_are_not_used(method: str) -> None:
     """Whoever seeds torch draws the same numbers, loads and runs in between or not."""
     before = torch.get_rng_state()
     load(method)

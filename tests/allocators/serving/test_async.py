@@ -30,7 +30,7 @@ LATEST_S = 5.0
 """Seconds by the clock after which a cancelled run has ended even on a busy machine: it must not sleep, either."""
 
 
-def test_answer_is_that_of_solve() -> None:
+def test_answer_matches_solve() -> None:
     """Two parallel runs give the results of `solve` without blocking the event loop."""
 
     async def both() -> list[Result]:
@@ -41,7 +41,7 @@ def test_answer_is_that_of_solve() -> None:
         assert result.allocation == solve(HARD, "ga", iterations=3, time_limit_s=None, seed=seed).allocation
 
 
-def test_errors_are_those_of_solve() -> None:
+def test_errors_match_solve() -> None:
     """What `solve` raises is raised where the run is awaited."""
     with pytest.raises(InputError, match="there is no method"):
         asyncio.run(solve_async(HARD, "nothing"))
@@ -56,14 +56,14 @@ class Exhausted(Allocator):
         return next(iter(()))
 
 
-def test_an_exception_that_no_future_holds_is_raised_as_well() -> None:
+def test_stop_iteration_is_raised() -> None:
     """StopIteration, which futures cannot hold, does not leave the caller waiting forever."""
     with pytest.raises(RuntimeError, match="StopIteration") as raised:
         asyncio.run(asyncio.wait_for(solve_async(HARD, Exhausted(), time_limit_s=1), 20))
     assert isinstance(raised.value.__cause__, StopIteration)
 
 
-def test_improvements_are_told_in_the_loop() -> None:
+def test_improvements_are_reported_in_the_event_loop() -> None:
     """The callback runs in the thread of the event loop; an exception from it ends the run and propagates."""
     seen: list[threading.Thread] = []
     asyncio.run(solve_async(HARD, "local-search", on_improvement=lambda _: seen.append(threading.current_thread()),
@@ -126,7 +126,7 @@ def test_cancelled_runs_leave_no_thread(name: str) -> None:
 
 
 @pytest.mark.slow
-def test_cancelled_at_random_moments() -> None:
+def test_runs_cancelled_at_random_times_leave_no_thread() -> None:
     """All methods, cancelled at 200 random times on an instance of the paper's size, end and leave no thread."""
     rng, before = random.Random(1), threading.active_count()
     methods = [load(name) for name in registry.BUILT_IN]

@@ -49,7 +49,7 @@ def client(service):
         yield found
 
 
-def test_statuses(client):
+def test_status_codes(client):
     """Solved requests give 200, bad input 400, refusals 422, and bodies that are too large 413."""
     solved = client.post("/solve", json={"id": 1, "instance": EASY})
     assert (solved.status_code, solved.json()["id"], solved.json()["result"]["makespan"]) == (200, 1, 2.0)
@@ -78,7 +78,7 @@ def test_health_metrics_and_openapi(client):
     assert "limit_ms" in body["content"]["application/json"]["schema"]["properties"]
 
 
-def test_a_client_that_leaves_cancels_its_run(service, client):
+def test_disconnect_cancels_the_run(service, client):
     """Once the connection is closed, the run ends long before its limit."""
     body = json.dumps(LONG).encode()
     host, port = service.address.removeprefix("http://").split(":")
@@ -88,7 +88,7 @@ def test_a_client_that_leaves_cancels_its_run(service, client):
     until(lambda: service.open_requests == 0)
 
 
-def test_a_client_that_leaves_within_its_body_is_no_fault(service, client, caplog):
+def test_incomplete_body_is_discarded(service, client, caplog):
     """An incomplete body is discarded, without a traceback in the log."""
     host, port = service.address.removeprefix("http://").split(":")
     with socket.create_connection((host, int(port))) as raw:
@@ -116,7 +116,7 @@ def test_load_is_answered_in_time(service, client):
     assert threading.active_count() <= before + 2
 
 
-def test_a_full_queue_is_503(service, client):
+def test_full_queue_gives_503(service, client):
     """Requests beyond the running and waiting ones are rejected, with the advice to try again."""
     jobs = [service.submit(LONG) for _ in range(9)]
     busy = client.post("/solve", json={"instance": EASY})

@@ -38,7 +38,7 @@ def answered(service: Service, request: object) -> Answer:
     return answer
 
 
-def test_answer_has_the_result_of_solve(service):
+def test_answer_matches_solve(service):
     """A request gives what `solve` gives, with its id; the method is loaded once."""
     request = {"id": 3, "instance": HARD, "method": "ga", "parameters": {"population": 8}, "iterations": 3, "seed": 5}
     answer = answered(service, request)
@@ -80,7 +80,7 @@ def test_answer_has_the_result_of_solve(service):
         ({"instance": FLYING, "method": "ga"}, "refused", "speeds"),
     ],
 )  # fmt: skip
-def test_bad_requests_are_answered_by_one_line(service, request_, kind, words):
+def test_bad_requests_get_a_one_line_error(service, request_, kind, words):
     """Every error in a request is reported with its place, and the service continues."""
     if isinstance(request_, dict):
         request_ = json.dumps(request_)
@@ -91,7 +91,7 @@ def test_bad_requests_are_answered_by_one_line(service, request_, kind, words):
     assert answered(service, {"instance": EASY}).outcome is Outcome.SOLVED
 
 
-def test_a_full_queue_turns_requests_away(service):
+def test_full_queue_rejects_requests(service):
     """Beyond one running and one waiting request, the answer is busy at once; cancelled requests make room."""
     jobs = [service.submit({**LONG, "id": number}) for number in range(3)]
     assert jobs[2].answer.result(0).outcome is Outcome.BUSY
@@ -103,7 +103,7 @@ def test_a_full_queue_turns_requests_away(service):
     assert answered(service, {"instance": EASY}).outcome is Outcome.SOLVED
 
 
-def test_a_deadline_counts_from_the_arrival(service):
+def test_deadline_counts_from_arrival(service):
     """A request that waited for its whole time limit gets a first plan, without additional time."""
     first, second = (service.submit({**LONG, "limit_ms": 1000}) for _ in range(2))
     runtimes = [job.answer.result(30).document["result"]["runtime_s"] for job in (first, second)]
@@ -111,7 +111,7 @@ def test_a_deadline_counts_from_the_arrival(service):
     assert runtimes[1] < 0.3
 
 
-def test_the_end_gives_open_requests_their_best(service):
+def test_shutdown_answers_open_requests(service):
     """A service that ends answers open requests with the best so far, and rejects further requests."""
     job = service.submit(LONG)
     time.sleep(0.1)
@@ -121,7 +121,7 @@ def test_the_end_gives_open_requests_their_best(service):
 
 
 @pytest.mark.parametrize("kind", [ZeroDivisionError, SystemExit])
-def test_defects_are_answers_too(service, monkeypatch, caplog, kind):
+def test_unexpected_exceptions_are_answered(service, monkeypatch, caplog, kind):
     """An unexpected exception or exit is answered as failed and logged with its traceback; no request stays open."""
 
     def fail(*_: object, **__: object) -> None:
@@ -134,7 +134,7 @@ def test_defects_are_answers_too(service, monkeypatch, caplog, kind):
     assert service.open_requests == 0
 
 
-def test_loading_a_method_holds_up_no_other(monkeypatch):
+def test_loading_a_method_does_not_block_others(monkeypatch):
     """While a method is being loaded, once for two requests, requests for loaded methods are answered."""
     begun, loaded, names = threading.Event(), threading.Event(), []
 
@@ -161,7 +161,7 @@ def test_loading_a_method_holds_up_no_other(monkeypatch):
         service.close()
 
 
-def test_methods_of_the_operator_have_their_parameters():
+def test_preloaded_methods_use_their_parameters():
     """A method loaded with parameters uses them in requests that set none."""
     service = Service(ServiceLimits(), {"ga": {"population": 8}})
     try:
@@ -173,7 +173,7 @@ def test_methods_of_the_operator_have_their_parameters():
         Service(ServiceLimits(), {"ga": {"population": 0}})
 
 
-def test_lines_are_answered_as_they_end():
+def test_lines_are_answered_in_order_of_completion():
     """Requests in lines are distinguished by ids: short ones overtake, cancelled ones end, errors get an answer."""
     service, written, grown = Service(ServiceLimits(parallel=2)), [], threading.Event()
 
@@ -200,7 +200,7 @@ def test_lines_are_answered_as_they_end():
     )
 
 
-def test_ids_that_json_lacks_are_answered_over_lines(service):
+def test_invalid_ids_are_answered_over_lines(service):
     """An id that is not a finite number is an error, answered without an id; large integers are returned exactly."""
     written = []
     lines = RequestLines(service, lambda line: written.append(json.loads(line)))
@@ -212,7 +212,7 @@ def test_ids_that_json_lacks_are_answered_over_lines(service):
     assert answered(service, {"id": 2**53 - 1, "instance": EASY}).document["id"] == 2**53 - 1
 
 
-def test_instances_come_back_as_they_went(service):
+def test_assignments_refer_to_the_instance_of_the_request(service):
     """The assignment of an answer is one of the instance of the request."""
     instance = Instance(ability=[2.0, 1.0], workload=[4.0, 1.0])
     answer = answered(service, {"instance": to_document(instance), "method": "greedy"})

@@ -12,7 +12,7 @@ def write(assignment, name="small"):
     Path("answer.json").write_text(json.dumps(document))
 
 
-def test_scores_are_those_of_the_evaluator(alloc, small):
+def test_scores_match_the_evaluator(alloc, small):
     """`alloc evaluate --json` prints the evaluator's scores, and the same per task."""
     assignment = {"a1": "t1", "a4": "t2", "a5": "t3", "a2": None}
     write(assignment)
@@ -59,7 +59,7 @@ def test_result_from_standard_input(alloc, small):
     assert ran.json["makespan"] == result.json["makespan"]
 
 
-def test_the_bound_of_a_result_is_that_of_its_run(alloc, small):
+def test_bounds_of_a_result_are_shown(alloc, small):
     """Bounds proven by `solve` are shown by `evaluate`, as JSON and as text."""
     solved = alloc("solve", "small.json", "--method", "cpsat", "--objective", "makespan-energy", "--output", "r.json")
     result = json.loads(Path("r.json").read_text())
@@ -88,7 +88,7 @@ def test_the_bound_of_a_result_is_that_of_its_run(alloc, small):
         ),
     ],
 )
-def test_the_bound_of_another_instance_is_left_out(alloc, small, change, words):
+def test_bounds_of_another_instance_are_left_out(alloc, small, change, words):
     """A bound holds only for its instance: with other agents or scores there is a note instead."""
     assert alloc("solve", "small.json", "--method", "cpsat", "--output", "r.json").code == 0
     own = {"task_position": small.task_position, "start_task": small.start_task, "battery": small.battery}
@@ -107,7 +107,7 @@ def test_the_bound_of_another_instance_is_left_out(alloc, small, change, words):
 
 
 @pytest.mark.parametrize("bound", ["high", None, True, 1e9, [], 0])
-def test_bounds_that_cannot_be_are_left_out(alloc, small, bound):
+def test_invalid_bounds_are_left_out(alloc, small, bound):
     """Bounds that are not numbers, exceed the makespan, or are weaker, are ignored."""
     assert alloc("solve", "small.json", "--method", "greedy", "--output", "r.json").code == 0
     document = json.loads(Path("r.json").read_text())
@@ -118,7 +118,7 @@ def test_bounds_that_cannot_be_are_left_out(alloc, small, bound):
     assert ("is no bound on the makespan" in ran.err) == (not is_valid or bound is True)
 
 
-def test_what_a_result_states_wrongly_is_told(alloc, small):
+def test_wrong_scores_in_a_result_are_reported(alloc, small):
     """If agents of a result were moved by hand, the scores in the file and the true ones are reported."""
     assert alloc("solve", "small.json", "--method", "cpsat", "--output", "r.json").code == 0
     document = json.loads(Path("r.json").read_text())
@@ -129,7 +129,7 @@ def test_what_a_result_states_wrongly_is_told(alloc, small):
     assert f"r.json: its makespan is {stated}, but on this instance it is {so}; its bounds are left out" in ran.err
 
 
-def test_unserved_tasks_that_are_stated_otherwise_are_told(alloc, unservable):
+def test_wrong_unserved_tasks_in_a_result_are_reported(alloc, unservable):
     """A result that claims to serve every task although one is unserved is contradicted."""
     assert alloc("solve", "unservable.json", "--method", "greedy", "--output", "r.json").code == 1
     assert "note" not in alloc("evaluate", "unservable.json", "r.json").err

@@ -4,7 +4,7 @@ import highspy
 import pytest
 
 
-def test_the_solution_of_an_exported_model_is_evaluated(alloc, small):
+def test_solution_of_an_exported_model_is_evaluated(alloc, small):
     """An instance is exported, solved by another solver, and its solution evaluated to the optimal scores."""
     assert alloc("export", "small.json", "--output", "small.lp") == type(alloc("--version"))(0, "", "")
     highs = highspy.Highs()
@@ -15,7 +15,7 @@ def test_the_solution_of_an_exported_model_is_evaluated(alloc, small):
     assert alloc("evaluate", "small.json", "small.sol", "--json").json["makespan"] == pytest.approx(13 / 11)
 
 
-def test_the_command_has_two_names(alloc, small):
+def test_export_model_is_an_alias(alloc, small):
     """`export-model` writes what `export` does."""
     for name in ("export", "export-model"):
         assert alloc(name, "small.json", "--output", f"{name}.mps").code == 0

@@ -6,7 +6,7 @@ from alloc.problems import Family, machine_covering, paper, random_instance
 from alloc.problems.formats import read_instance, to_document
 
 
-def test_paper_scenarios_are_the_generator_s(alloc):
+def test_paper_scenarios_match_the_generator(alloc):
     """A scenario with a seed is the same instance as from Python."""
     assert alloc("generate", "paper-1", "--seed", "7", "--output", "p.json").code == 0
     assert to_document(read_instance("p.json")) == to_document(paper(1, 7))
@@ -31,7 +31,7 @@ def test_every_parameter_of_the_family_is_an_option(alloc):
     assert to_document(read_instance("r.npz")) == to_document(random_instance(family, 5))
 
 
-def test_machine_covering_is_the_generator_s(alloc):
+def test_machine_covering_matches_the_generator(alloc):
     """Families of the published table have a name and their own options."""
     assert alloc("generate", "covering", "--seed", "7", "--output", "c.json").code == 0
     assert to_document(read_instance("c.json")) == to_document(machine_covering(100, 25, 1, 1000, 7))
@@ -54,21 +54,21 @@ def test_machine_covering_is_the_generator_s(alloc):
         ("--tau", "0.5", "--tau: is for random, not for covering"),
     ],
 )
-def test_machine_covering_refuses(alloc, option, value, told):
+def test_machine_covering_refuses_other_options(alloc, option, value, told):
     """Options that do not apply to these families are errors that name them."""
     ran = alloc("generate", "covering", option, value)
     assert (ran.code, ran.out) == (2, "")
     assert told in ran.err
 
 
-def test_count_gives_a_file_per_seed(alloc):
+def test_count_writes_a_file_per_seed(alloc):
     """--count writes one file per seed, starting with the given one."""
     assert alloc("generate", "paper-1", "--seed", "3", "--count", "2", "--output", "new/many").code == 0
     files = sorted(Path("new/many").iterdir())
     assert [read_instance(file).name for file in files] == ["paper-1-seed-3", "paper-1-seed-4"]
 
 
-def test_standard_output_is_json_alone(alloc):
+def test_standard_output_is_only_json(alloc):
     """Without --output the instance is written to standard output."""
     ran = alloc("generate", "random", "--agents", "3", "--tasks", "2")
     assert ran.err == ""

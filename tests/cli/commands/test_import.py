@@ -22,7 +22,7 @@ def run(alloc, *options):
 
 
 @pytest.mark.usefixtures("tables")
-def test_it_says_what_it_guessed(alloc):
+def test_guesses_are_reported(alloc):
     """Each column, and each omission, has a line on standard error; the instance can be solved."""
     ran = run(alloc, "--output", "fleet.json")
     assert (ran.code, ran.out) == (0, "")
@@ -41,7 +41,7 @@ def test_it_says_what_it_guessed(alloc):
 
 
 @pytest.mark.usefixtures("tables")
-def test_a_table_alone_leads_to_this_command(alloc):
+def test_solving_a_table_refers_to_import(alloc):
     """Solving a single table gives an error that refers to `alloc import`."""
     ran = alloc("solve", "tasks.csv")
     assert (ran.code, len(ran.err.splitlines())) == (2, 1)
@@ -49,14 +49,14 @@ def test_a_table_alone_leads_to_this_command(alloc):
 
 
 @pytest.mark.usefixtures("tables")
-def test_it_goes_to_standard_output(alloc):
+def test_dash_writes_json_to_standard_output(alloc):
     """`-` writes only JSON; `--quiet` prints nothing."""
     ran = run(alloc, "--output", "-", "--quiet")
     assert (ran.code, ran.err, ran.json["name"]) == (0, "", "agents")
 
 
 @pytest.mark.usefixtures("tables")
-def test_columns_are_named_by_the_user(alloc):
+def test_columns_can_be_mapped_by_the_user(alloc):
     """`--map` accepts several fields, texts with commas and blanks, and numbers for all rows."""
     Path("tasks.csv").write_text('"Job, no",Length of work\ns1,3\ns2,5\n')
     ran = run(alloc, "--map", "tasks.id=Job, no,workload=Length of work,ability=2", "--output", "fleet.json")
@@ -97,7 +97,7 @@ def test_tables_are_not_overwritten(alloc):
 
 
 @pytest.mark.usefixtures("tables")
-def test_other_formats_say_what_to_save(alloc):
+def test_unsupported_formats_name_supported_ones(alloc):
     """Unsupported spreadsheet formats are refused with the supported ones."""
     Path("fleet.ods").write_bytes(b"PK")
     ran = alloc("import", "--agents", "fleet.ods", "--tasks", "tasks.csv", "--output", "fleet.json")
@@ -105,7 +105,7 @@ def test_other_formats_say_what_to_save(alloc):
 
 
 @pytest.mark.usefixtures("tables")
-def test_openpyxl_is_asked_for(alloc, monkeypatch):
+def test_missing_openpyxl_is_named(alloc, monkeypatch):
     """Without openpyxl, a workbook is refused with the command that installs it."""
     monkeypatch.setitem(__import__("sys").modules, "openpyxl", None)
     Path("fleet.xlsx").write_bytes(b"PK")

@@ -14,7 +14,7 @@ def mission(alloc):
     return "mission.json"
 
 
-def test_a_mission_is_simulated_and_replayed(alloc, mission):
+def test_mission_is_simulated_and_replayed(alloc, mission):
     """What is printed for a run comes again from its log, byte for byte, and is valid by its schema."""
     ran = alloc("simulate", mission, "--policy", "greedy", "--deadline-ms", "0", "--log", "run.jsonl", "--json")
     assert ran.code == 0
@@ -28,7 +28,7 @@ def test_a_mission_is_simulated_and_replayed(alloc, mission):
     assert [record["hour"] for record in records] == sorted(record["hour"] for record in records)
 
 
-def test_summaries_are_for_people(alloc, mission):
+def test_summaries_go_to_standard_error(alloc, mission):
     """Without --json nothing goes to standard output; several runs are a table."""
     ran = alloc("simulate", mission, "--policy", "nearest")
     assert ran.out == ""
@@ -63,7 +63,7 @@ def test_ctrl_c_keeps_the_runs_that_are_complete(alloc, mission, monkeypatch):
     assert (ran.code, ran.out) == (130, "")
 
 
-def test_a_log_that_cannot_be_written_costs_no_figures(alloc, mission, monkeypatch):
+def test_unwritable_log_keeps_the_result(alloc, mission, monkeypatch):
     """A disk that is full by the end of a run leaves its result on standard output, with exit code 2."""
 
     def fail(*_):
@@ -75,7 +75,7 @@ def test_a_log_that_cannot_be_written_costs_no_figures(alloc, mission, monkeypat
     assert ran.err == "alloc: run.jsonl: cannot be written: no space left on device\n"
 
 
-def test_exit_codes_are_those_of_solve(alloc, mission):
+def test_exit_codes_match_solve(alloc, mission):
     """1 if not all is done, 2 with one line for what is wrong."""
     assert alloc("simulate", mission, "--policy", "idle").code == 1
     for arguments, told in (
@@ -91,7 +91,7 @@ def test_exit_codes_are_those_of_solve(alloc, mission):
         assert told in ran.err
 
 
-def test_faults_of_files_are_told(alloc):
+def test_invalid_files_are_one_line(alloc):
     """A mission or a log that is none is one line with file and place."""
     with open("bad.json", "w", encoding="utf-8") as file:
         file.write('{"format": "alloc-mission/1", "agents": [{"id": "a", "ability": 1}], "tasks": []}')
@@ -102,7 +102,7 @@ def test_faults_of_files_are_told(alloc):
     assert "bad.json: is not a log of a mission, but of the format 'alloc-mission/1'" in ran.err
 
 
-def test_one_document_over_many_lines_is_no_log(alloc, mission):
+def test_mission_in_place_of_a_log_is_reported(alloc, mission):
     """A mission, whose first line alone is no JSON, is told as what it is; to draw a plan takes two files."""
     ran = alloc("replay", mission)
     assert (ran.code, ran.out) == (2, "")
@@ -126,7 +126,7 @@ def test_knowledge_is_checked_before_loops_are_compiled(alloc, mission, monkeypa
     assert "needs full knowledge (--knowledge full)" in ran.err
 
 
-def test_an_instance_is_simulated(alloc):
+def test_instance_is_simulated_as_a_mission(alloc):
     """An instance is a mission: re-planning once for all is as good as its makespan."""
     assert alloc("generate", "random", "--agents", "6", "--tasks", "2", "--output", "i.json").code == 0
     ran = alloc("simulate", "i.json", "--policy", "replan", "--set", "method=greedy", "--json")
@@ -134,7 +134,7 @@ def test_an_instance_is_simulated(alloc):
     assert ran.json["mission_time"] <= solved.json["makespan"] * (1 + 1e-9)
 
 
-def test_options_of_missions_are_for_missions(alloc):
+def test_mission_options_are_refused_for_instances(alloc):
     """What is for missions alone is refused elsewhere, and the other way round."""
     for arguments, told in (
         (("random", "--family", "waves"), "is for mission, not for random"),
@@ -147,7 +147,7 @@ def test_options_of_missions_are_for_missions(alloc):
         assert told in ran.err
 
 
-def test_a_mission_is_drawn_and_played_from_a_run_and_from_its_log(alloc, mission):
+def test_mission_is_drawn_and_animated_from_a_run_and_from_its_log(alloc, mission):
     """Picture and page are written by the run, and by `alloc plot` from the log; only the run's page has knowledge."""
     assert alloc(
         "simulate", mission, "--policy", "greedy", "--log", "x.jsonl", "--plot", "x.svg", "--animate", "x.html"
@@ -158,7 +158,7 @@ def test_a_mission_is_drawn_and_played_from_a_run_and_from_its_log(alloc, missio
     assert "<svg" in Path("x.svg").read_text(encoding="utf-8")
 
 
-def test_wrong_names_of_films_are_told_before_the_run(alloc, mission):
+def test_invalid_animation_files_are_refused_before_the_run(alloc, mission):
     """A suffix that no animation has, and a damaged log, are one line and exit code 2."""
     found = alloc("simulate", mission, "--policy", "greedy", "--animate", "x.avi")
     assert (found.code, found.err.strip()) == (2, "alloc: x.avi: must end in .gif, .mp4 or .html")
@@ -188,7 +188,7 @@ def test_policies_are_compared(alloc, mission):
     assert (table.code, table.out) == (0, "")
 
 
-def test_policies_and_methods_are_not_mixed(alloc, mission, small):
+def test_policies_and_methods_cannot_be_mixed(alloc, mission, small):
     """One line says what goes with what, whether options or files are mixed up."""
     for arguments, told in (
         ((mission, "--methods", "greedy"), "`alloc compare --policies` take missions"),
@@ -251,7 +251,7 @@ def test_cfstp_is_generated(alloc):
     assert "--loss: is for mission, not for cfstp" in ran.err
 
 
-def test_files_of_others_are_imported(alloc):
+def test_files_of_other_projects_are_imported(alloc):
     """The example files become missions that validate; options of records are refused for others, in one line."""
     folder = Path(__file__).parents[3] / "examples" / "records"
     for kind, name in (

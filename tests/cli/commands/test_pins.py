@@ -38,7 +38,7 @@ def signs(tmp_path):
         ("D=", {"D": None}),
     ],
 )
-def test_an_id_may_contain_the_sign(alloc, signs, pair, pins):
+def test_ids_may_contain_an_equals_sign(alloc, signs, pair, pins):
     """The text is split such that both sides are ids of the instance."""
     ran = alloc("solve", "signs.json", "--method", "greedy", "--json", "--pin", pair)
     assert ran.json["pins"] == pins
@@ -54,21 +54,21 @@ def test_an_id_may_contain_the_sign(alloc, signs, pair, pins):
         ("=task", "must be AGENT=TASK, got '=task'"),
     ],
 )
-def test_what_cannot_be_meant_is_refused(alloc, signs, pair, message):
+def test_ambiguous_and_invalid_pins_are_refused(alloc, signs, pair, message):
     """Ambiguous and invalid pins are one line; an unknown task is reported for the longest known agent id."""
     ran = alloc("solve", "signs.json", "--pin", pair)
     assert (ran.code, ran.out, ran.err.count("\n")) == (2, "", 1)
     assert ran.err.startswith(f"alloc: --pin: {message}")
 
 
-def test_what_is_ambiguous_on_the_command_line_can_be_pinned_by_a_file(alloc, signs):
+def test_pin_file_resolves_ambiguous_pins(alloc, signs):
     """The alternative suggested by the message works."""
     write({"D=2": "task"})
     assert pins_of(alloc, "--pin-file", "pins.json", instance="signs.json") == {"D=2": "task"}
 
 
 @pytest.mark.parametrize("file", [(), ("--pin-file", "pins.json")])
-def test_an_agent_pinned_twice_is_refused(alloc, small, file):
+def test_contradicting_pins_are_refused(alloc, small, file):
     """Contradicting options are refused, with and without a file; repetitions are accepted."""
     write({"a2": "t1"})
     message = pins_of(alloc, *file, "--pin", "a1=t1", "--pin", "a1=t2")
@@ -78,13 +78,13 @@ def test_an_agent_pinned_twice_is_refused(alloc, small, file):
     assert pins_of(alloc, *file, "--pin", "a1=t1", "--pin", "a1=t1")["a1"] == "t1"
 
 
-def test_an_option_counts_more_than_the_file(alloc, small):
+def test_option_overrides_the_pin_file(alloc, small):
     """--pin overrides the file for one agent, and the file applies to the others."""
     write({"a1": "t1", "a2": "t2"})
     assert pins_of(alloc, "--pin-file", "pins.json", "--pin", "a1=t3") == {"a1": "t3", "a2": "t2"}
 
 
-def test_pins_of_what_has_gone_are_left_out(alloc, small):
+def test_pins_of_removed_agents_and_tasks_are_dropped(alloc, small):
     """As with --start, agents and tasks that no longer exist are dropped, with a note."""
     write({"a1": "t1", "a2": "t9", "a9": "t2"})
     ran = alloc("solve", "small.json", "--method", "greedy", "--json", "--pin-file", "pins.json")
@@ -100,7 +100,7 @@ def test_pins_of_what_has_gone_are_left_out(alloc, small):
         ({"a1": 3}, "pins.json: assignment.a1: must be the id of a task, or null, got 3"),
     ],
 )
-def test_errors_of_the_file_name_it(alloc, unservable, assignment, message):
+def test_errors_name_the_pin_file(alloc, unservable, assignment, message):
     """Errors in a file of pins name the file and the agent."""
     write(assignment)
     ran = alloc("solve", "unservable.json", "--pin-file", "pins.json")

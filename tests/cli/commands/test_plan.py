@@ -60,7 +60,7 @@ def orders(answer: dict) -> dict:
     return {order["agent"]: order["task"] for order in answer["orders"]}
 
 
-def test_each_line_is_answered_by_one(alloc, pair):
+def test_each_line_gets_one_answer(alloc, pair):
     """Plans are returned after events and requests, unless not requested; changes have causes."""
     ran = alloc("plan", "pair.json", "--stdio", "--policy", "nearest", stdin=lines(*REQUESTS))
     assert ran.code == 0
@@ -77,7 +77,7 @@ def test_each_line_is_answered_by_one(alloc, pair):
     assert [list(validator.iter_errors(request)) for request in REQUESTS] == [[]] * len(REQUESTS)
 
 
-def test_errors_are_lines_and_lose_nothing(alloc, pair):
+def test_invalid_lines_get_an_error_and_change_nothing(alloc, pair):
     """An invalid line is answered by an error, and does not change the plan."""
     wrong = (
         ("", "is empty"),
@@ -100,7 +100,7 @@ def test_errors_are_lines_and_lose_nothing(alloc, pair):
     assert found[-1]["orders"] == found[0]["orders"]
 
 
-def test_the_first_line_may_be_the_mission(alloc, pair):
+def test_first_line_may_be_the_mission(alloc, pair):
     """Without MISSION, the first line that is a mission is used, and answered by the first plan."""
     text = lines("nonsense", to_document(pair), {"event": "agent-fails", "agent": "ann"})
     found = answers(alloc("plan", "--stdio", "--policy", "nearest", stdin=text).out)
@@ -108,7 +108,7 @@ def test_the_first_line_may_be_the_mission(alloc, pair):
     assert [orders(answer) for answer in found[1:]] == [{"ann": "t1", "ben": "t2"}, {"ben": "t2"}]
 
 
-def test_it_goes_on_from_its_state(alloc, pair):
+def test_planning_resumes_from_saved_state(alloc, pair):
     """The next run resumes from the state saved at the end of the input; MISSION is then an error."""
     arguments = ("plan", "--stdio", "--policy", "nearest", "--state", "state.json")
     first = alloc(*arguments, "pair.json", stdin=lines({"event": "agent-fails", "agent": "ann", "hour": 1}))
@@ -119,7 +119,7 @@ def test_it_goes_on_from_its_state(alloc, pair):
     assert "planning resumes from state.json" in ran.err
 
 
-def test_wrong_arguments_are_told_before_any_line(alloc, pair):
+def test_wrong_arguments_are_refused_before_any_line(alloc, pair):
     """An unknown policy or file gives one line and exit code 2."""
     for arguments, told in (
         (("pair.json",), "--stdio: is required"),
@@ -136,7 +136,7 @@ def test_wrong_arguments_are_told_before_any_line(alloc, pair):
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")
-def test_sigterm_is_a_clean_end(pair, tmp_path):
+def test_sigterm_ends_cleanly(pair, tmp_path):
     """Earlier lines are answered and saved, and the exit code is 0, although the input is still open."""
     command = [*COMMAND, str(tmp_path / "pair.json"), "--state", str(tmp_path / "state.json")]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
@@ -153,7 +153,7 @@ def test_sigterm_is_a_clean_end(pair, tmp_path):
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")
-def test_killed_after_it_saved_it_goes_on(alloc, pair, tmp_path):
+def test_saved_state_survives_sigkill(alloc, pair, tmp_path):
     """A state saved by request survives SIGKILL; the next run has the same plan."""
     command = [*COMMAND, str(tmp_path / "pair.json"), "--state", str(tmp_path / "state.json")]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
@@ -169,7 +169,7 @@ def test_killed_after_it_saved_it_goes_on(alloc, pair, tmp_path):
 
 
 @pytest.mark.skipif(shutil.which("jq") is None, reason="needs jq")
-def test_a_shell_with_jq_can_use_it(pair, tmp_path):
+def test_shell_client_with_jq(pair, tmp_path):
     """A pipe of jq on both sides: events made, orders read."""
     script = (
         'jq -nc \'{request: "plan"}, {hour: 2, event: "agent-fails", agent: "ben"}\' | '
@@ -196,7 +196,7 @@ send({request: "plan"});
 
 
 @pytest.mark.skipif(shutil.which("node") is None, reason="needs node")
-def test_a_program_of_node_can_use_it(pair, tmp_path):
+def test_node_client(pair, tmp_path):
     """It sends requests and waits for answers, gets an error for a wrong id, and ends `alloc` by closing its input."""
     command = ["node", "-e", NODE, *COMMAND, str(tmp_path / "pair.json")]
     done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True)

@@ -72,7 +72,7 @@ def test_every_command_reads_every_plan(alloc, small, name):
     assert alloc("pareto", "small.json", *options, "--start", name).code == 0
 
 
-def test_a_table_that_solve_wrote_is_a_plan(alloc, small):
+def test_table_of_solve_is_read_back(alloc, small):
     """The .csv of --output can be read back, including idle agents."""
     assert alloc("solve", "small.json", "--method", "greedy", "-q", "--output", "p.csv", "--pin", "a3=").code == 0
     with open("p.csv", newline="") as file:
@@ -93,7 +93,7 @@ def test_a_table_that_solve_wrote_is_a_plan(alloc, small):
         ("", "p.csv: is empty; its first line must name the columns: agent,task"),
     ],
 )
-def test_a_broken_table_is_one_line(alloc, small, text, message):
+def test_invalid_table_is_one_line(alloc, small, text, message):
     """Errors in a table name file, line and column, with exit code 2."""
     Path("p.csv").write_text(text)
     for command in (("evaluate", "small.json", "p.csv"), ("plot", "small.json", "p.csv", "--output", "p.png")):
@@ -102,7 +102,7 @@ def test_a_broken_table_is_one_line(alloc, small, text, message):
         assert ran.err.startswith(f"alloc: {message}")
 
 
-def test_a_result_without_a_plan_is_still_drawn(alloc, small):
+def test_result_without_a_plan_is_drawn(alloc, small):
     """A result without an allocation is drawn as a message, and is not a plan for other commands."""
     result = alloc("solve", "small.json", "--method", "greedy", "--json").json
     result |= dict.fromkeys(("makespan", "served_makespan", "energy", "distance", "reward", "lower_bound", "gap"))

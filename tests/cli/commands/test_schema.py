@@ -9,7 +9,7 @@ from alloc.problems.formats.schemas import SCHEMAS, schema
 
 
 @pytest.mark.parametrize("name", ["alloc-instance/1", "instance", "alloc-result/1", "result", "policy"])
-def test_a_schema_is_printed_as_json(alloc, name):
+def test_schema_is_printed_as_json(alloc, name):
     """The full name of a format, and the short one, print its schema to standard output and nothing else."""
     ran = alloc("schema", name)
     assert (ran.code, ran.err) == (0, "")
@@ -30,7 +30,7 @@ def test_unknown_formats_are_errors(alloc):
     assert ran.err == "alloc: NAME: there is no format 'alloc-instanze/1' (did you mean 'alloc-instance/1'?)\n"
 
 
-def test_metadata_of_policies_are_as_their_schema_says():
+def test_metadata_of_policies_are_valid():
     """The metadata of every policy that ships with the package are valid."""
     from jsonschema import Draft202012Validator
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 
-def test_a_port_that_is_taken_is_one_line(alloc):
+def test_occupied_port_is_one_line(alloc):
     """The line has the reason of the operating system, and the state of the process is restored."""
     before = sys.getswitchinterval()
     with socket.create_server(("127.0.0.1", 0)) as taken:
@@ -36,7 +36,7 @@ def test_methods_that_cannot_be_loaded_are_one_line(alloc, load, begin):
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="a device that is always full")
-def test_answers_that_cannot_be_written_end_the_service():
+def test_unwritable_answers_end_the_service():
     """On a full disk it ends with one line and exit code 2, and no traceback, though more requests come."""
     command = [sys.executable, "-m", "alloc", "serve", "--stdio"]
     with open("/dev/full", "w") as full:

@@ -20,7 +20,7 @@ FIELDS = [
 ]  # fmt: skip
 
 
-def test_json_is_the_result_format_and_all_there_is_on_stdout(alloc, small):
+def test_json_is_alone_on_standard_output(alloc, small):
     """Standard output has the fields of alloc-result/1, which agree with the evaluator."""
     ran = alloc("solve", "small.json", "--method", "greedy", "--seed", "3", "--json")
     result = ran.json
@@ -45,13 +45,13 @@ def test_summary_goes_to_stderr(alloc, small):
         assert words in ran.err
 
 
-def test_quiet_says_nothing(alloc, small):
+def test_quiet_prints_nothing(alloc, small):
     """With --quiet a successful run prints nothing."""
     ran = alloc("solve", "small.json", "--quiet", "--method", "greedy")
     assert (ran.code, ran.out, ran.err) == (0, "", "")
 
 
-def test_auto_says_what_it_picked(alloc, small):
+def test_auto_names_the_method_it_picked(alloc, small):
     """The notes of the result, such as auto's choice, are printed on standard error."""
     ran = alloc("solve", "small.json", "--json")
     assert "note: auto picked" in ran.err
@@ -78,14 +78,14 @@ def test_output_start_and_standard_streams(alloc, small):
     assert ran.json["instance"] == "instance" or ran.json["instance"] == "small"
 
 
-def test_iterations_alone_are_reproducible(alloc, small):
+def test_iteration_limits_are_reproducible(alloc, small):
     """With --iterations alone, the same seed gives the same result."""
     runs = [alloc("solve", "small.json", "--method", "ga", "--iterations", "5", "--json").json for _ in range(2)]
     assert runs[0]["assignment"] == runs[1]["assignment"]
     assert runs[0]["stop_reason"] != "time_limit"
 
 
-def test_what_has_changed_since_the_start_was_made_is_a_note(alloc, small):
+def test_changes_since_the_start_are_noted(alloc, small):
     """A plan for a changed instance is used as far as possible, with a note on the changes."""
     Path("other.json").write_text(
         json.dumps({"format": "alloc-allocation/1", "instance": "other", "assignment": {"a1": "t1"}})
@@ -114,14 +114,14 @@ def test_saturated_reward_is_a_note(alloc):
         assert "reward" not in ran.err
 
 
-def test_the_picture_is_that_of_the_answer(alloc, small):
+def test_plot_shows_the_plan_of_the_result(alloc, small):
     """--plot draws exactly the plan of the result."""
     assert alloc("solve", "small.json", "--method", "greedy", "--plot", "picture.png", "-q").code == 0
     plot(solve(small, "greedy", handle_signals=False), "expected.png")
     assert compare_images("expected.png", "picture.png", 0) is None
 
 
-def test_a_drawing_in_svg_names_all(alloc, small):
+def test_svg_has_all_names(alloc, small):
     """--plot also writes .svg, with a bar and a name for each task, and the scores in the title."""
     assert alloc("solve", "small.json", "--method", "greedy", "--plot", "picture.svg", "-q").code == 0
     content = Path("picture.svg").read_text("utf-8")
@@ -132,7 +132,7 @@ def test_a_drawing_in_svg_names_all(alloc, small):
     assert any(f"T = {number(result.makespan, 4)}," in words for words in written)
 
 
-def test_the_saved_result_is_that_of_stdout(alloc, small):
+def test_saved_result_matches_standard_output(alloc, small):
     """--output and --json give the same document, and the instance file is not changed."""
     ran = alloc("solve", "small.json", "--method", "greedy", "--output", "result.json", "--json")
     assert json.loads(Path("result.json").read_text()) == ran.json
@@ -140,20 +140,20 @@ def test_the_saved_result_is_that_of_stdout(alloc, small):
 
 
 @pytest.mark.parametrize("option", ["--output", "--plot"])
-def test_an_empty_name_is_no_file(alloc, small, option):
+def test_empty_file_name_is_refused(alloc, small, option):
     """An empty name, as from an unset shell variable, is not the working folder."""
     ran = alloc("solve", "small.json", option, "")
     assert (ran.code, ran.out, ran.err.count("\n")) == (2, "", 1)
 
 
-def test_closed_standard_output_is_told(alloc, small, monkeypatch):
+def test_closed_standard_output_is_reported(alloc, small, monkeypatch):
     """A closed standard output is an error with --json; a requested file is still written."""
     monkeypatch.setattr("sys.stdout", None)
     assert main(["solve", "small.json", "--method", "greedy", "-q", "--json", "--output", "best.json"]) == 2
     assert json.loads(Path("best.json").read_text())["instance"] == "small"
 
 
-def test_slack_buys_energy(alloc, small):
+def test_slack_saves_energy(alloc, small):
     """With slack the result has a longer makespan, within the limit, and less energy."""
     strict = alloc("solve", "small.json", "--objective", "makespan-energy", "--json").json
     loose = alloc("solve", "small.json", "--objective", "makespan-energy", "--makespan-slack", "1", "--json")
@@ -186,7 +186,7 @@ def test_wrong_slack_is_refused(alloc, small, arguments, words):
     assert ran.err.count("\n") == 1
 
 
-def test_a_start_for_another_instance_names_its_file(alloc, small):
+def test_start_for_another_instance_names_its_file(alloc, small):
     """A plan without any agent of the instance is an error that says which file it is."""
     document = {"format": "alloc-allocation/1", "assignment": {"z9": None}}
     Path("other.json").write_text(json.dumps(document))

@@ -77,21 +77,21 @@ def weights(path: Path) -> dict[str, torch.Tensor]:
         ("--turn", "both"),
     ],
 )
-def test_bad_usage_is_told_before_training(alloc, more):
+def test_bad_usage_is_reported_before_training(alloc, more):
     """Invalid options are reported at once, in one line."""
     ran = alloc("train", "gappo", "--output", "p.safetensors", *more)
     assert (ran.code, ran.out, ran.err.count("\n")) == (2, "", 1)
     assert not Path("p.safetensors").exists()
 
 
-def test_methods_that_cannot_be_trained_so(alloc):
+def test_unsupported_methods_are_refused(alloc):
     """Unknown methods, and populations for methods with a single network, are errors."""
     assert "did you mean 'gappo'" in alloc("train", "gapo", "--output", "p.safetensors").err
     ran = alloc("train", "ppo", "--output", "p.safetensors", "--population", "3")
     assert (ran.code, ran.err.count("\n")) == (2, 1)
 
 
-def test_tensorboard_that_is_not_installed_is_told_before_training(alloc, monkeypatch):
+def test_missing_tensorboard_is_reported_before_training(alloc, monkeypatch):
     """The error names the extra to install."""
     monkeypatch.setitem(sys.modules, "torch.utils.tensorboard", None)
     ran = alloc("train", "ppo", "--output", "p.safetensors", "--tensorboard", "events")
@@ -117,7 +117,7 @@ def test_interrupted_before_the_first_generation_writes_no_policy(alloc, monkeyp
     assert signal.getsignal(number) is before
 
 
-def test_an_engine_that_gives_up_is_told_in_one_line(alloc, monkeypatch, mine):
+def test_failing_engine_is_one_line(alloc, monkeypatch, mine):
     """Lack of memory is not a defect of the program; the line says what is kept, and how to resume."""
 
     def give_up(*_):
@@ -131,7 +131,7 @@ def test_an_engine_that_gives_up_is_told_in_one_line(alloc, monkeypatch, mine):
     assert "died 3 times at the same item; p.checkpoint holds 0 generations, and resuming" in told
 
 
-def test_a_run_is_not_overwritten_by_mistake(alloc, mine):
+def test_existing_run_is_not_overwritten(alloc, mine):
     """If a checkpoint exists, a new training must be resumed or written elsewhere."""
     assert alloc("train", "ppo", "--output", "p.safetensors", *QUICK, "--iterations", "1").code == 0
     before = files()
@@ -143,7 +143,7 @@ def test_a_run_is_not_overwritten_by_mistake(alloc, mine):
     assert "p.checkpoint: holds a training run" in alloc("train", "ppo", "--output", "p.safetensors", *QUICK).err
 
 
-def test_a_run_without_a_generation_blocks_none(alloc, mine):
+def test_run_without_generations_does_not_block_another(alloc, mine):
     """Files of a run without a complete generation do not block another run."""
     assert alloc("train", "gappo", "--output", "p", *QUICK, "--iterations", "0").code == 1
     assert Path("p.checkpoint").exists()
@@ -167,7 +167,7 @@ def test_a_run_without_a_generation_blocks_none(alloc, mine):
         (("gappo", "--workers", "2"), "belongs to the engine processes"),
     ],
 )
-def test_what_is_wrong_in_any_case_comes_first(alloc, more, message):
+def test_option_errors_precede_checkpoint_errors(alloc, more, message):
     """Errors in options are reported before errors about checkpoints."""
     Path("p.checkpoint").write_bytes(b"weeks of training")
     ran = alloc("train", *more, "--output", "p.safetensors")
@@ -192,7 +192,7 @@ def test_what_is_wrong_in_any_case_comes_first(alloc, more, message):
         (("--output", "-"), "policy, checkpoint and log must be files"),
     ],
 )
-def test_what_training_did_not_write_is_not_replaced(alloc, small, more, message):
+def test_foreign_files_are_not_overwritten(alloc, small, more, message):
     """Instances, foreign tensors, policies and tables are not overwritten."""
     save_file({"a": torch.zeros(2)}, "tensors")
     save_policy("policy", [ActorCritic(NetworkSize(4, 4, 1))], "ppo")
@@ -203,14 +203,14 @@ def test_what_training_did_not_write_is_not_replaced(alloc, small, more, message
     assert files() == before
 
 
-def test_empty_files_hold_nothing(alloc, mine):
+def test_empty_files_can_be_overwritten(alloc, mine):
     """An empty file, such as a temporary one, can be overwritten."""
     for name in ("p", "p.checkpoint", "p.csv"):
         Path(name).touch()
     assert alloc("train", "ppo", "--output", "p", *QUICK, "--iterations", "1").code == 0
 
 
-def test_mistakes_are_told_before_torch_is_loaded(small, tmp_path):
+def test_option_errors_do_not_load_torch(small, tmp_path):
     """Errors in options are reported without loading torch."""
     mistakes = [
         "gapo",
@@ -233,7 +233,7 @@ def test_mistakes_are_told_before_torch_is_loaded(small, tmp_path):
     assert ran.stderr.count("\n") == len(mistakes)
 
 
-def test_resumed_by_another_command_it_goes_on_to_the_same_curve(alloc, mine):
+def test_resumed_training_gives_the_same_curve(alloc, mine):
     """Two generations, and then two more, equal four; progress and outcome are printed."""
     whole = alloc("train", "gappo", "--output", "w", *QUICK, "--steps", "1500", "--population", "2")
     assert whole.code == 0
@@ -255,7 +255,7 @@ def test_resumed_by_another_command_it_goes_on_to_the_same_curve(alloc, mine):
 
 
 @pytest.mark.slow
-def test_killed_at_any_moment_it_resumes_to_the_same_curve(alloc, mine):
+def test_killed_training_resumes_to_the_same_curve(alloc, mine):
     """Repeated kill -9 during training leaves complete files, and does not change log or policy."""
     options = [*QUICK, "--steps", "3000", "--population", "2"]
     assert alloc("train", "gappo", "--output", "w", *options).code == 0
@@ -287,7 +287,7 @@ def _is_newer(name: str, moment: int) -> bool:
     return os.path.exists(name) and os.stat(name).st_mtime_ns > moment
 
 
-def test_a_policy_is_a_beginning(alloc, mine):
+def test_training_can_start_from_a_policy(alloc, mine):
     """--init starts from the networks of a policy of any method; the file records its origin."""
     assert alloc("train", "ppo", "--output", "p", *QUICK, "--steps", "300", "--seed", "3").code == 0
     ran = alloc("train", "gappo", "--output", "g", *QUICK, "--init", "p", "--iterations", "0", "--checkpoint", "c")
@@ -305,7 +305,7 @@ def test_a_policy_is_a_beginning(alloc, mine):
     assert training["turn"] == "bidding"
 
 
-def test_what_judges_the_networks_is_named(alloc, mine):
+def test_held_out_instances_are_named(alloc, mine):
     """Some of the given instances are held out, and named; those without work are left out."""
     ran = alloc("train", "ppo", "--output", "p", *QUICK, "--iterations", "1")
     assert "note: the networks are judged on the instances that they learn from" in ran.err
@@ -318,7 +318,7 @@ def test_what_judges_the_networks_is_named(alloc, mine):
     assert "note: 1 of 8 instances held out to judge the networks: paper-like-" in ran.err
 
 
-def test_the_game_of_the_paper_can_be_trained_on(alloc, mine):
+def test_game_of_the_paper_can_be_trained(alloc, mine):
     """Training with simultaneous choices and the coverage reward works."""
     ran = alloc(
         "train", "ppo", "--output", "p", *QUICK, "--iterations", "1", "--turn", "simultaneous", "--reward", "coverage"
@@ -326,7 +326,7 @@ def test_the_game_of_the_paper_can_be_trained_on(alloc, mine):
     assert ran.code == 0
 
 
-def test_options_are_those_of_the_library():
+def test_options_match_the_library():
     """The command line, which does not load torch, has the same engines and families."""
     assert {engine.value for engine in train_options.Engine} == set(ENGINES)
     for name in FAMILIES:
@@ -334,7 +334,7 @@ def test_options_are_those_of_the_library():
 
 
 @pytest.mark.needs("tensorboard")
-def test_a_resumed_run_keeps_its_events(alloc, mine):
+def test_resumed_run_keeps_its_events(alloc, mine):
     """TensorBoard shows the generations before and after --resume, each once."""
     from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
@@ -347,7 +347,7 @@ def test_a_resumed_run_keeps_its_events(alloc, mine):
     assert len(steps) == 3
 
 
-def test_a_checkpoint_that_cannot_be_written_costs_no_policy(alloc, mine, monkeypatch):
+def test_unwritable_checkpoint_keeps_the_policy(alloc, mine, monkeypatch):
     """If the checkpoint does not fit on the disk, the networks of the last generation are still stored."""
     save = module_of_training.Trainer.save
 
@@ -362,7 +362,7 @@ def test_a_checkpoint_that_cannot_be_written_costs_no_policy(alloc, mine, monkey
     assert weights(Path("p.safetensors"))
 
 
-def test_the_former_name_of_an_option_still_works(alloc, mine):
+def test_former_option_name_still_works(alloc, mine):
     """--lesson is --generation-steps; the help does not show it."""
     assert "--lesson" not in alloc("train", "--help").out
     for name in ("--lesson", "--generation-steps"):

@@ -6,7 +6,7 @@ from alloc.allocators.learned.training import tune as module
 
 
 @pytest.mark.needs("optuna")
-def test_the_best_is_told_as_options_of_train(alloc, monkeypatch):
+def test_best_hyperparameters_are_printed_as_options_of_train(alloc, monkeypatch):
     """The best hyperparameters are printed as options of `alloc train`."""
 
     def tune(study, parameters, trials, limits, *, seed, on_trial):
@@ -18,7 +18,7 @@ def test_the_best_is_told_as_options_of_train(alloc, monkeypatch):
     assert ran.err.splitlines()[-1] == "best cost 0.5: alloc train ppo --set learning_rate=0.5"
 
 
-def test_bad_usage(alloc):
+def test_bad_usage_is_one_line(alloc):
     """Unknown methods, families and folders are one-line errors."""
     for options in (
         ("gapo", "--study", "s.db"),

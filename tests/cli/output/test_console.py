@@ -19,7 +19,7 @@ def test_control_characters_cannot_break_the_line():
 @pytest.mark.parametrize(
     ("share", "text"), [(None, "-"), (0.0, "0 %"), (4e-7, "0 %"), (0.0321, "3.2 %"), (1.0, "100 %"), (0.5, "50 %")]
 )
-def test_percent(share, text):
+def test_percentages(share, text):
     """Shares are readable, and proven gaps are 0 %."""
     assert percent(share) == text
 
@@ -29,14 +29,14 @@ def test_table_is_aligned():
     assert table(["id", "T"], [["a", "10"], ["bcd", "9"]]) == "id    T\n---  --\na    10\nbcd   9"
 
 
-def test_wide_letters_take_two_columns():
+def test_wide_characters_take_two_columns():
     """Columns stay aligned beside names in Chinese or with combining accents."""
     assert table(["id", "T"], [["\u540d\u524d", "1"], ["e\u0301", "2"]]) == (
         "id    T\n----  -\n\u540d\u524d  1\ne\u0301     2"
     )
 
 
-def test_streams_without_unicode(monkeypatch):
+def test_unencodable_characters_are_escaped(monkeypatch):
     """Characters that a terminal cannot encode are escaped, without an exception."""
     stream = io.TextIOWrapper(io.BytesIO(), encoding="ascii")
     monkeypatch.setattr(sys, "stderr", stream)
@@ -44,7 +44,7 @@ def test_streams_without_unicode(monkeypatch):
     assert stream.buffer.getvalue() == b"Z\\xfcrich\n"  # type: ignore[attr-defined]
 
 
-def test_write_protected_places_are_told(tmp_path, monkeypatch):
+def test_write_protected_files_are_reported_before_the_run(tmp_path, monkeypatch):
     """A write-protected file is detected before the run, with the same error as on writing."""
     (tmp_path / "x.json").touch()
     monkeypatch.setattr("os.access", lambda path, mode: False)
@@ -62,7 +62,7 @@ class Bare:
         self.text += text
 
 
-def test_streams_that_can_only_be_written_to(alloc, small, monkeypatch):
+def test_streams_with_only_write(alloc, small, monkeypatch):
     """No command needs `isatty` or `flush`; a closed stream is not a terminal."""
     for arguments in (
         ("solve", "small.json", "--method", "greedy"),
@@ -93,6 +93,6 @@ def test_streams_that_can_only_be_written_to(alloc, small, monkeypatch):
         {"t": {"k": {"j": "x"}}},
     ],
 )
-def test_json_is_that_of_the_standard_library(value: object) -> None:
+def test_json_matches_the_standard_library(value: object) -> None:
     """The fast encoding of large objects gives the same text."""
     assert to_json(value) == json.dumps(value, indent=2) + "\n"

@@ -28,7 +28,7 @@ from alloc.allocators.learned.network.actor_critic import ActorCritic, NetworkSi
         ("compare", "tables", "--methods", "greedy", "--csv", "tables/bases.csv"),
     ],
 )
-def test_outputs_that_clash_are_refused(alloc, small, arguments):
+def test_clashing_outputs_are_refused(alloc, small, arguments):
     """One line says which two names are the same file, and no file is changed."""
     Path("nowhere").mkdir()
     Path("link.json").symlink_to("small.json")
@@ -42,7 +42,7 @@ def test_outputs_that_clash_are_refused(alloc, small, arguments):
     assert {path: path.read_bytes() for path in Path().rglob("*") if path.is_file()} == before
 
 
-def test_a_start_may_be_replaced_by_what_is_better(alloc, small):
+def test_result_may_replace_its_start(alloc, small):
     """A result may replace the one that it started from, and devices may be written repeatedly."""
     assert alloc("solve", "small.json", "--method", "greedy", "--output", "best.json").code == 0
     again = ("solve", "small.json", "--method", "greedy", "--start", "best.json", "--output", "best.json")
@@ -50,7 +50,7 @@ def test_a_start_may_be_replaced_by_what_is_better(alloc, small):
     assert alloc("evaluate", "small.json", "best.json").code == 0
 
 
-def test_standard_output_holds_one_thing(alloc, small):
+def test_standard_output_holds_one_document(alloc, small):
     """A table as CSV and as JSON cannot both go to standard output."""
     ran = alloc("compare", "small.json", "--methods", "greedy", "--csv", "-", "--json")
     assert (ran.code, ran.out, ran.err.count("\n")) == (2, "", 1)
@@ -78,7 +78,7 @@ def full_disk(monkeypatch):
 
 
 @pytest.mark.parametrize("arguments", RUNS)
-def test_what_cannot_be_written_after_a_run_is_printed(alloc, small, full_disk, arguments):
+def test_unwritable_result_is_printed(alloc, small, full_disk, arguments):
     """If the disk is full at the end of a run, the result is on standard output, with exit code 2."""
     ran = alloc(*arguments)
     assert ran.code == 2
@@ -91,13 +91,13 @@ def test_what_cannot_be_written_after_a_run_is_printed(alloc, small, full_disk, 
 
 
 @pytest.mark.parametrize("arguments", RUNS)
-def test_what_is_printed_anyway_is_printed_once(alloc, small, full_disk, arguments):
+def test_json_is_printed_once(alloc, small, full_disk, arguments):
     """With --json standard output has exactly one document, even if other outputs fail."""
     ran = alloc(*arguments, "--json")
     assert (ran.code, ran.json["format"].split("-")[0]) == (2, "alloc")
 
 
-def test_a_picture_is_drawn_although_the_result_cannot_be_written(alloc, small, monkeypatch):
+def test_failing_output_does_not_prevent_others(alloc, small, monkeypatch):
     """One failing output does not prevent the others."""
     replace = os.replace
 
@@ -113,7 +113,7 @@ def test_a_picture_is_drawn_although_the_result_cannot_be_written(alloc, small, 
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="a device that is always full")
-def test_full_standard_output_leaves_standard_error(small, tmp_path):
+def test_full_standard_output_falls_back_to_standard_error(small, tmp_path):
     """If standard output is closed or full, the result is on standard error."""
     command = [sys.executable, "-m", "alloc.cli", "solve", "small.json", "--method", "greedy", "-q"]
     with open("/dev/full", "w") as full:
@@ -141,7 +141,7 @@ def test_full_standard_output_leaves_standard_error(small, tmp_path):
         ("mkfifo p; cat p >> log & {} --output p; wait", "earlier\n"),
     ],
 )
-def test_descriptors_and_pipes_take_results(small, tmp_path, line, kept):
+def test_results_can_be_written_to_descriptors_and_pipes(small, tmp_path, line, kept):
     """A result appended to a file follows the old content, and is written once."""
     (tmp_path / "log").write_text(kept)
     command = f"'{sys.executable}' -m alloc.cli solve small.json --method greedy -q"
@@ -153,7 +153,7 @@ def test_descriptors_and_pipes_take_results(small, tmp_path, line, kept):
 
 
 @pytest.mark.slow
-def test_file_names_that_are_no_utf_8(small, tmp_path):
+def test_non_utf_8_file_names(small, tmp_path):
     """Names that are not UTF-8 work for instances, results, pictures, tables and policies, in every command."""
     old = os.fsdecode(b"caf\xe9")
     shutil.copy(tmp_path / "small.json", tmp_path / "plain.json")

@@ -10,7 +10,7 @@ from alloc.cli.output.plan import plan_tables
 from alloc.problems import Allocation, Instance, Units
 
 
-def test_the_plan_is_printed_before_the_summary(alloc, small):
+def test_plan_is_printed_before_the_summary(alloc, small):
     """A table by task with its group, one by agent with distance and battery, then the summary."""
     shown = alloc("solve", "small.json", "--method", "greedy").err
     task, agent = shown.split("\n\n")[:2]
@@ -21,12 +21,12 @@ def test_the_plan_is_printed_before_the_summary(alloc, small):
 
 
 @pytest.mark.parametrize("option", ["--quiet", "--json"])
-def test_the_plan_is_not_printed_where_nobody_reads(alloc, small, option):
+def test_quiet_and_json_print_no_plan(alloc, small, option):
     """Neither --quiet nor --json prints tables."""
     assert "battery left" not in alloc("solve", "small.json", "--method", "greedy", option).err
 
 
-def test_long_tables_are_cut():
+def test_long_tables_are_truncated():
     """At most 50 rows and six agents per group are shown, with the number of further ones."""
     instance = Instance(ability=[1] * 60, workload=[60])
     tasks, agents = plan_tables(scored_result(instance, Allocation([0] * 60)))
@@ -35,7 +35,7 @@ def test_long_tables_are_cut():
     assert agents.splitlines()[-1].startswith("... and 10 more agents")
 
 
-def test_names_are_shortened_without_becoming_equal():
+def test_shortened_names_remain_distinct():
     """Long names with equal beginnings stay different, and headings have units."""
     ids = [f"a building with a very long name, floor {number}" for number in (1, 2)]
     instance = Instance(ability=[1, 1], workload=[1, 1], task_ids=ids, units=Units(time="min", work="m2"))
@@ -45,14 +45,14 @@ def test_names_are_shortened_without_becoming_equal():
     assert len({name[4:] for name in names}) == 2
 
 
-def test_a_task_without_work_is_not_unserved():
+def test_task_without_work_is_not_unserved():
     """Without work a task is done at 0; a task with work and no agent is unserved."""
     instance = Instance(ability=[1], workload=[0, 1, 1])
     rows = plan_tables(scored_result(instance, Allocation([1])))[0].splitlines()[2:]
     assert [row.split()[2:] for row in rows] == [["0", "0", "-"], ["1", "1", "a1"], ["unserved", "0", "-"]]
 
 
-def test_the_suffix_decides(alloc, small):
+def test_suffix_determines_the_format(alloc, small):
     """A table and a map are written, and nothing is printed to standard output."""
     for name in ("plan.csv", "plan.html", "plan.xlsx"):
         ran = alloc("solve", "small.json", "--method", "greedy", "-q", "--output", name)
@@ -72,6 +72,6 @@ def test_other_suffixes_are_refused_before_the_run(alloc, small, monkeypatch, na
     assert not Path(name).exists()
 
 
-def test_a_device_takes_json(alloc, small):
+def test_devices_get_json(alloc, small):
     """A device, which has no suffix, gets JSON."""
     assert alloc("solve", "small.json", "--method", "greedy", "-q", "--output", "/dev/null").code == 0

@@ -20,7 +20,7 @@ def improvement(instance, tasks, bound=1.0):
     return Improvement(0.0, allocation, evaluate(instance, allocation), bound)
 
 
-def test_line_tells_seconds_makespan_gap_and_energy(small):
+def test_line_shows_seconds_makespan_gap_and_energy(small):
     """The line shows what is known: nothing yet, unserved tasks, or T with gap and energy."""
     assert progress_line(2.0, None).startswith("   2.0 s  no allocation yet; ")
     assert "  1 task unserved" in progress_line(2.0, improvement(small, [0, 1, -1, -1, -1]))
@@ -53,7 +53,7 @@ def test_terminals_that_cannot_clear_a_line_get_no_escape_codes(monkeypatch, ter
     assert ("\x1b" in sys.stderr.getvalue()) == shown  # type: ignore[attr-defined]
 
 
-def test_short_runs_and_files_see_nothing(monkeypatch):
+def test_no_progress_for_short_runs_and_files(monkeypatch):
     """Nothing is shown for short runs, or if standard error is a file."""
     monkeypatch.setattr(sys, "stderr", Terminal())
     with Progress():

@@ -20,7 +20,7 @@ def same_reach(instance: Instance) -> None:
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-def test_changes_against_the_definitions(seed: int) -> None:
+def test_changes_match_the_definitions(seed: int) -> None:
     """After each change, reachability and distances agree with the fields; copies equal their models."""
     instance = varied_instance(seed)
     more = instance.with_agents([{"id": "copy", "like": "a1"}, {"id": "blank", "ability": 2}])
@@ -36,7 +36,7 @@ def test_changes_against_the_definitions(seed: int) -> None:
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-def test_who_moves_returns_to_where_it_started(seed: int) -> None:
+def test_moved_agents_return_to_their_original_start(seed: int) -> None:
     """Distances home are unchanged after moves to a place or a task, with or without given distances."""
     instance = varied_instance(seed, {"metric", "distances", "returns", "bases"} if seed % 2 else None)
     moved = instance.moved_to({"a1": "t2", "a2": instance.task_position[0].tolist()})
@@ -64,7 +64,7 @@ def test_agents_that_started_together_share_a_base() -> None:
     assert moved.reach.cost[moved.reach.origin, 0].tolist() == [4 + 5, 3 + 5, 2, 5 + 5]
 
 
-def test_new_agents_return_where_they_are_told() -> None:
+def test_new_agents_return_to_the_given_base() -> None:
     """They return to a base by its id, to their start, or to the base of the copied agent."""
     instance = Instance(ability=[1], workload=[1], bases={"north": (0, 1)}, return_base=[0])
     rows = [{"id": "b", "like": "a1"}, {"id": "c", "like": "a1", "returns": True}, {"id": "d", "ability": 1}]
@@ -107,14 +107,14 @@ def test_without_tasks_nobody_moves(seed: int) -> None:
         (lambda one: one.moved_to({"a1": [1.0]}), "must be 2 or 3 numbers"),
     ],
 )
-def test_errors_say_what_to_mend(change, message: str) -> None:
+def test_invalid_changes_are_refused(change, message: str) -> None:
     """Invalid changes are refused."""
     instance = Instance(ability=[1, 2], workload=[3, 4], task_position=[[0, 0], [1, 1]], start_task=[0, 1])
     with pytest.raises(InputError, match=message):
         change(instance)
 
 
-def test_rows_of_a_copy() -> None:
+def test_copies_share_given_distances() -> None:
     """Given distances of an agent also apply to its copies, in both directions; a new agent has none."""
     table = DistanceTable.of([("a1", "t1", 5.0), ("t2", "a1", 7.0)], ["a1"], ["t1", "t2"], missing="unreachable")
     instance = Instance(ability=[1], workload=[1, 1], distances=table)

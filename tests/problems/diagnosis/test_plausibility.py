@@ -69,7 +69,7 @@ DOUBTFUL = [
 
 
 @pytest.mark.parametrize(("changes", "field", "words"), DOUBTFUL)
-def test_what_may_not_be_meant_is_found(changes: dict[str, Any], field: str, words: str) -> None:
+def test_implausible_values_are_found(changes: dict[str, Any], field: str, words: str) -> None:
     """There is one finding, with the name of the field in files and a description."""
     found = findings(fleet(**changes))
     assert [one.field for one in found] == [field]
@@ -77,18 +77,18 @@ def test_what_may_not_be_meant_is_found(changes: dict[str, Any], field: str, wor
     assert "\n" not in found[0].message
 
 
-def test_distances_of_ones_own_need_no_places() -> None:
+def test_given_distances_need_no_places() -> None:
     """An agent without a place is not a finding if a table gives its distances."""
     table = DistanceTable.of([("a2", "t1", 3.0), ("a2", "t2", 4.0)], ("a1", "a2", "a3"), ("t1", "t2"))
     assert findings(fleet(agent_position=((0, 0), (np.nan, np.nan), (3, 1)), distances=table)) == ()
 
 
-def test_degrees_that_are_meant_are_no_finding() -> None:
+def test_intended_degrees_are_no_finding() -> None:
     """With the geographic metric, degrees are not a finding."""
     assert findings(fleet(**BERLIN, metric="geographic")) == ()
 
 
-def test_priority_without_effect() -> None:
+def test_priorities_without_effect_are_found() -> None:
     """Different priorities are a finding if all tasks can be served; equal ones are not."""
     assert priority_without_effect(fleet()) is None
     found = priority_without_effect(fleet(priority=(1, 2)))

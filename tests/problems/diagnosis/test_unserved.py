@@ -21,7 +21,7 @@ FLEET = Instance(
 )
 
 
-def test_reasons_by_hand() -> None:
+def test_reasons_match_hand_calculation() -> None:
     """The nearest agent and what it lacks, or what able agents do instead; highest priorities first."""
     reasons = {FLEET.task_ids[one.task]: one.reason for one in why_unserved(FLEET, Allocation([1, -1, 0]))}
     assert reasons == {
@@ -35,7 +35,7 @@ def test_reasons_by_hand() -> None:
     )
 
 
-def test_agents_that_are_pinned_are_called_so() -> None:
+def test_pinned_agents_are_reported_as_pinned() -> None:
     """Pinned agents are reported as pinned, not as idle or busy."""
     pinned = why_unserved(FLEET, Allocation([1, -1, -1]), most=1, pinned={0, 2})
     assert pinned[0].reason == "2 agents could take it: a1 is pinned to t2 (priority 2), a3 is pinned to no task"
@@ -44,7 +44,7 @@ def test_agents_that_are_pinned_are_called_so() -> None:
     assert any(note.startswith("besides the pinned agents, ") for note in result.notes)
 
 
-def test_ways_home_that_are_not_given_are_told() -> None:
+def test_missing_distances_to_the_base_are_reported() -> None:
     """A task without a given distance to the agent's base is reported as such."""
     rows = [("a1", "t1", 1.0), ("a1", "t2", 2.0), ("t1", "north", 1.0)]
     table = DistanceTable.of(rows, ["a1"], ["t1", "t2"], "unreachable", ["north"])
@@ -54,7 +54,7 @@ def test_ways_home_that_are_not_given_are_told() -> None:
     }
 
 
-def test_reasons_are_told_in_text_and_in_the_document() -> None:
+def test_reasons_are_in_the_summary_and_the_result() -> None:
     """The summary and the result have the reasons; a result that serves all has no such field."""
     result = solve(FLEET, time_limit_s=2)
     assert "t4 (priority 1): no agent can take it" in str(result)
@@ -74,7 +74,7 @@ def test_reasons_are_told_in_text_and_in_the_document() -> None:
 
 
 @pytest.mark.parametrize("seed", range(60))
-def test_reasons_hold(seed: int) -> None:
+def test_reasons_are_true(seed: int) -> None:
     """Agents said to be able are, the nearest is not; no able agent serves a task of lower priority."""
     for instance in (scarce_instance(seed), varied_instance(seed)):
         plan = solve(instance, "greedy", iterations=1).allocation

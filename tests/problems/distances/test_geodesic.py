@@ -20,7 +20,7 @@ def places(rng: np.random.Generator) -> np.ndarray:
 
 
 @pytest.mark.parametrize("unit", METRES)
-def test_distances_are_those_of_pyproj(unit: str) -> None:
+def test_distances_match_pyproj(unit: str) -> None:
     """Within 0.1 % on 10,000 pairs, and a straight line is never longer."""
     rng = np.random.default_rng(0)
     one, other = places(rng), places(rng)
@@ -31,7 +31,7 @@ def test_distances_are_those_of_pyproj(unit: str) -> None:
     assert (straight <= found * (1 + 1e-9)).all()
 
 
-def test_altitude_and_unknown_places() -> None:
+def test_altitude_counts_and_unknown_places_are_at_distance_zero() -> None:
     """Altitude differences count by Pythagoras, and unknown places are at distance 0, as in (1)."""
     one = np.array([[0, 0, 3000.0], [0, 0, 0], [np.nan] * 3])
     other = np.array([[0, 0, -1000.0], [0, 0.0, 250], [1.0, 1, 0]])
@@ -39,13 +39,13 @@ def test_altitude_and_unknown_places() -> None:
 
 
 @pytest.mark.parametrize("shape", [(0,), (1,), (1, 1), (2, 1)])
-def test_distances_have_the_shape_of_the_places(shape: tuple[int, ...]) -> None:
+def test_distances_have_the_shape_of_the_input(shape: tuple[int, ...]) -> None:
     """Any number of pairs works, also one, about which some versions of numpy and pyproj warn."""
     away = geodesic_distances(np.zeros((*shape, 3)), np.array([0.0, 0, 7]), "m")
     assert away.tolist() == np.full(shape, 7.0).tolist()
 
 
-def test_an_instance_in_miles() -> None:
+def test_distances_use_the_unit_of_the_instance() -> None:
     """Distances of an instance are in its unit, and reach is by them."""
     instance = Instance(
         ability=[1, 1],

@@ -9,7 +9,7 @@ AGENTS, TASKS = ("a1", "a2", "x"), ("t1", "t2", "x")
 ROWS = [("a1", "t1", 3.0), ("t1", "a1", 4.0), ("t2", "t1", 0.5)]
 
 
-def test_rows_and_columns_make_the_same_table() -> None:
+def test_row_and_column_forms_give_the_same_table() -> None:
     """Agents are nodes from 0 on, followed by tasks, in both forms of tables; arrays are read-only."""
     source, target, distance = zip(*ROWS, strict=True)
     for table in (
@@ -22,7 +22,7 @@ def test_rows_and_columns_make_the_same_table() -> None:
         assert not any(array.flags.writeable for array in (table.source, table.target, table.distance))
 
 
-def test_an_empty_table_is_one() -> None:
+def test_empty_table_is_valid() -> None:
     """A table without rows is valid, and makes all tasks unreachable if it says so."""
     table = DistanceTable.from_columns([], [], np.zeros(0), AGENTS, TASKS, missing="unreachable")
     assert (len(table.source), len(table.target), len(table.distance)) == (0, 0, 0)
@@ -39,7 +39,7 @@ def test_an_empty_table_is_one() -> None:
         ([*ROWS, ("a2", "t1")], r"distances\.rows\[3\]: must be \[from, to, distance\] with two ids"),
     ],
 )
-def test_rows_that_break_a_rule(rows: list[tuple[str, str, float]], message: str) -> None:
+def test_invalid_rows_are_located(rows: list[tuple[str, str, float]], message: str) -> None:
     """The error for the first invalid row has its number and, for an invalid id, the column."""
     with pytest.raises(InputError, match=message):
         DistanceTable.of(rows, AGENTS, TASKS)

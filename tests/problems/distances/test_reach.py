@@ -11,7 +11,7 @@ from alloc.problems.distances.metric import BLOCK
 
 
 @given(instances())
-def test_agrees_with_plain_loops(instance: Instance) -> None:
+def test_reach_matches_plain_loops(instance: Instance) -> None:
     """Every distance and every permission is that of its agent, although agents share rows."""
     distance, able = reachable(instance)
     reach = instance.reach
@@ -23,7 +23,7 @@ def test_agrees_with_plain_loops(instance: Instance) -> None:
     assert reach.distance_of(agents, tasks) == pytest.approx(distance.ravel())
 
 
-def test_agents_alike_share_an_origin() -> None:
+def test_identical_agents_share_an_origin() -> None:
     """Place, range, battery and list make an origin; 0.0 and -0.0, or two unknown places, are one."""
     nan = float("nan")
     instance = Instance(
@@ -62,7 +62,7 @@ def test_distances_do_not_depend_on_blocks() -> None:
         assert instance.reach.distance[instance.reach.origin[i]] == pytest.approx(expected, rel=1e-14)
 
 
-def test_read_only() -> None:
+def test_shared_arrays_are_read_only() -> None:
     """Shared arrays are read-only."""
     with pytest.raises(ValueError, match="read-only"):
         Instance(ability=[1], workload=[1]).reach.mask[0, 0] = False

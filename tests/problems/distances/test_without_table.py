@@ -51,7 +51,7 @@ def test_pairs_agree_with_the_table(seed: int) -> None:
 
 @pytest.mark.usefixtures("tableless")
 @pytest.mark.parametrize("method", ["greedy", pytest.param("local-search", marks=pytest.mark.slow)])
-def test_methods_for_large_instances(method: str) -> None:
+def test_methods_without_a_table_match_brute_force(method: str) -> None:
     """They serve as many tasks as brute force, with feasible plans and the same energy."""
     allocator = load(method)
     for seed in range(16):

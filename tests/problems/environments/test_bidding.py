@@ -31,20 +31,20 @@ def street() -> Instance:
 
 
 @pytest.mark.parametrize("make", [small, made])
-def test_it_passes_gymnasiums_own_test(make) -> None:
+def test_passes_the_gymnasium_check(make) -> None:
     """The project's test of interface and seeds passes, without a warning; there is nothing to render."""
     check_env(make(), skip_render_check=True)
 
 
 @pytest.mark.parametrize("make", [small, made])
-def test_it_passes_the_test_of_stable_baselines3(make) -> None:
+def test_passes_the_stable_baselines3_check(make) -> None:
     """So does that of Stable-Baselines3."""
     checker = pytest.importorskip("stable_baselines3.common.env_checker")
     checker.check_env(make(), warn=True)
 
 
 @pytest.mark.parametrize("name", EXTREMES)
-def test_observations_lie_in_their_space(name: str) -> None:
+def test_observations_are_in_their_space(name: str) -> None:
     """Observations are within their bounds and rewards finite, also for extreme numbers."""
     for reward in Reward:
         env = BiddingEnv([EXTREMES[name]], rules=Rules(reward=reward, flying=True))
@@ -57,7 +57,7 @@ def test_observations_lie_in_their_space(name: str) -> None:
             over = ended or cut
 
 
-def test_a_game_by_hand(street: Instance) -> None:
+def test_game_matches_hand_calculation(street: Instance) -> None:
     """The second agent flies 3 to the second task, then the planner stops: both tasks take an hour, for 3 of energy."""
     env = BiddingEnv([street], energy_weight=0.0)
     env.reset(seed=0)
@@ -87,7 +87,7 @@ def test_illegal_actions_change_nothing(street: Instance) -> None:
 
 
 @pytest.mark.parametrize("rules", [Rules(), Rules(reward="coverage"), Rules(flying=True, returning=True)])
-def test_rewards_add_up_to_the_rise_of_the_utility(rules: Rules) -> None:
+def test_rewards_sum_to_the_increase_of_utility(rules: Rules) -> None:
     """Rewards of any episode sum to the increase of the utility."""
     env = BiddingEnv([paper_like(8, 3, 30, 1)], rules=rules)
     env.reset(seed=0)
@@ -100,7 +100,7 @@ def test_rewards_add_up_to_the_rise_of_the_utility(rules: Rules) -> None:
     assert total == pytest.approx(after - before, abs=1e-3 * (1 + abs(before) + abs(after)))
 
 
-def test_the_same_seed_plays_the_same_games() -> None:
+def test_same_seed_gives_same_games() -> None:
     """The seed determines the sequence of instances; other seeds give other ones."""
 
     def games(seed: int) -> list[float]:

@@ -4,7 +4,7 @@ import subprocess
 import sys
 
 
-def test_what_is_missing_is_named() -> None:
+def test_missing_packages_are_named() -> None:
     """Without the extra, the message says what to install."""
     code = (
         "import sys\nsys.modules['gymnasium'] = None\n"

@@ -58,7 +58,7 @@ def street() -> Mission:
 
 
 @pytest.mark.parametrize("options", [{}, {"switching": True, "grid": 0, "max_steps": 40}, {"knowledge": "full"}])
-def test_agents_pass_pettingzoos_own_tests(options) -> None:
+def test_agents_pass_the_pettingzoo_tests(options) -> None:
     """The project's tests of interface and seeds pass; observations with a mask are as in its classic games."""
     with warnings.catch_warnings():  # which it has for all but the names of its own such games
         warnings.filterwarnings("ignore", "Observation is not a NumPy array")
@@ -68,7 +68,7 @@ def test_agents_pass_pettingzoos_own_tests(options) -> None:
 
 
 @pytest.mark.parametrize("options", [{}, {"switching": True, "max_steps": 20}])
-def test_the_fleet_passes_gymnasiums_own_test(options) -> None:
+def test_fleet_passes_the_gymnasium_check(options) -> None:
     """The project's test of interface and seeds passes, without a warning."""
     gymnasium.register("alloc/fleet-v0", fleet)
     try:
@@ -77,12 +77,12 @@ def test_the_fleet_passes_gymnasiums_own_test(options) -> None:
         del gymnasium.registry["alloc/fleet-v0"]
 
 
-def test_the_fleet_passes_the_test_of_stable_baselines3() -> None:
+def test_fleet_passes_the_stable_baselines3_check() -> None:
     """So does that of Stable-Baselines3."""
     pytest.importorskip("stable_baselines3.common.env_checker").check_env(fleet(), warn=True)
 
 
-def test_state_and_text_pass_pettingzoos_own_tests(capsys) -> None:
+def test_state_and_rendering_pass_the_pettingzoo_tests(capsys) -> None:
     """The project's tests of the state and of rendering pass, and text is printed for people."""
     env = agents()
     check_state_space(env)
@@ -97,7 +97,7 @@ def test_state_and_text_pass_pettingzoos_own_tests(capsys) -> None:
         fleet(render_mode="rgb")
 
 
-def test_the_state_is_what_is_so(street: Mission) -> None:
+def test_state_is_the_full_state(street: Mission) -> None:
     """The state includes what no agent sees, but not the future task; the text agrees."""
     for env in (MissionEnv([street], grid=0, render_mode="ansi"), MissionFleetEnv([street], render_mode="ansi")):
         env.reset(seed=0)
@@ -127,7 +127,7 @@ def play(env: MissionEnv, choose) -> dict[str, float]:
     return total
 
 
-def test_observations_lie_in_their_space_and_rewards_add_up() -> None:
+def test_observations_are_in_their_space_and_rewards_add_up() -> None:
     """Observations are within bounds; an agent's rewards are the common ones from its first turn on."""
     env = agents(energy_weight=0.1)
     rng = np.random.default_rng(0)
@@ -143,7 +143,7 @@ def test_observations_lie_in_their_space_and_rewards_add_up() -> None:
         assert total[first] == pytest.approx(env._course._value_so_far(), abs=1e-9)
 
 
-def test_an_agent_knows_what_it_sees(street: Mission) -> None:
+def test_agent_knows_what_it_sees(street: Mission) -> None:
     """It sees the task at distance 1, not those at 5 and 8, nor the other agent; its action mask agrees."""
     env = MissionEnv([street], grid=0)
     env.reset(seed=0)
@@ -159,7 +159,7 @@ def test_an_agent_knows_what_it_sees(street: Mission) -> None:
     assert seen["observation"][3] == pytest.approx(4 / 9)  # of a flight through the whole area
 
 
-def test_places_to_look_around_are_those_within_battery(street: Mission) -> None:
+def test_exploration_targets_are_within_battery(street: Mission) -> None:
     """Of the places at 1.5, 4.5 and 7.5 the first agent, with energy for 4, can fly to the first only."""
     env = MissionEnv([street], grid=3)
     env.reset(seed=0)
@@ -168,7 +168,7 @@ def test_places_to_look_around_are_those_within_battery(street: Mission) -> None
     assert env._course._simulation.state.agents[0].flight.goal.position == (1.5, 0, 0)
 
 
-def test_a_mission_by_hand(street: Mission) -> None:
+def test_mission_matches_hand_calculation(street: Mission) -> None:
     """The first agent does its task from hour 1 to 3, the second flies 1 and works 3 hours: rewards are these."""
     env = MissionEnv([street], grid=0, waiting_weight=0.0, energy_weight=1.0)
     env.reset(seed=0)
@@ -214,7 +214,7 @@ def test_no_information_leaks(street: Mission) -> None:
     np.testing.assert_equal(*seen)
 
 
-def test_the_fleet_leads_as_a_policy_does() -> None:
+def test_fleet_actions_match_a_policy() -> None:
     """Sending each free agent to the nearest feasible task gives the result of `nearest` with full knowledge."""
     mission = random_mission(SMALL, 5)
     env = MissionFleetEnv([mission])
@@ -230,7 +230,7 @@ def test_the_fleet_leads_as_a_policy_does() -> None:
     assert (info["mission_time"], info["energy"]) == (pytest.approx(result.mission_time), pytest.approx(result.energy))
 
 
-def test_illegal_actions_leave_agents_as_they_are(street: Mission) -> None:
+def test_illegal_actions_change_nothing(street: Mission) -> None:
     """Masked actions change nothing; the fleet gets the illegal reward, and infos say so."""
     env = MissionFleetEnv([street], illegal_reward=-1.0)
     env.reset(seed=0)

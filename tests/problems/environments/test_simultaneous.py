@@ -44,14 +44,14 @@ def everybody(env: SimultaneousEnv, *actions: int) -> dict[str, int]:
 
 
 @pytest.mark.parametrize("make", [small, made])
-def test_it_passes_pettingzoos_own_tests(make) -> None:
+def test_passes_the_pettingzoo_tests(make) -> None:
     """The project's tests of interface and seeds pass, without a warning."""
     parallel_api_test(make(), num_cycles=100)
     parallel_seed_test(make, num_cycles=50)
 
 
 @pytest.mark.parametrize("name", EXTREMES)
-def test_observations_lie_in_their_space(name: str) -> None:
+def test_observations_are_in_their_space(name: str) -> None:
     """Observations are within their bounds and rewards finite, also for extreme numbers."""
     for reward in Reward:
         rules = Rules(TurnRule.SIMULTANEOUS, reward, flying=True, returning=True)
@@ -65,7 +65,7 @@ def test_observations_lie_in_their_space(name: str) -> None:
             assert np.isfinite(list(rewards.values())).all()
 
 
-def test_what_an_agent_sees_by_hand(street: Instance) -> None:
+def test_observations_match_hand_calculation(street: Instance) -> None:
     """Within its range of 5 the first agent sees the tasks at 0 and 3, but not the agents at 7."""
     env = SimultaneousEnv([street])
     seen, _ = env.reset(seed=0)
@@ -85,7 +85,7 @@ def test_what_an_agent_sees_by_hand(street: Instance) -> None:
     assert seen["agent_2"]["action_mask"].tolist() == [0, 0, 1, 1]
 
 
-def test_what_is_out_of_range_is_not_seen(street: Instance) -> None:
+def test_objects_out_of_range_are_not_seen(street: Instance) -> None:
     """What the third agent does, at distance 7, does not affect the first one's observation, and vice versa."""
     views = []
     for last in (2, 3):
@@ -114,7 +114,7 @@ def test_energy_and_battery_add_up_over_the_hops(street: Instance) -> None:
     assert infos["agent_0"]["episode_energy"] == pytest.approx(2 * (3 + 6))
 
 
-def test_rewards_are_those_of_the_game(street: Instance) -> None:
+def test_rewards_match_the_game(street: Instance) -> None:
     """Each agent gets its difference reward, by (3) as in the paper or by the makespan."""
     for rules in (PAPER, Rules(TurnRule.SIMULTANEOUS)):
         env = SimultaneousEnv([street], rules=rules, energy_weight=0.25)
@@ -127,7 +127,7 @@ def test_rewards_are_those_of_the_game(street: Instance) -> None:
         assert step(board, reset(board), slot).done.item() is False
 
 
-def test_the_end(street: Instance) -> None:
+def test_termination_and_truncation(street: Instance) -> None:
     """A step without moves ends the game, too many steps truncate it; in both cases the plan is scored as usual."""
     env = SimultaneousEnv([street], max_steps=2)
     env.reset(seed=0)
@@ -149,7 +149,7 @@ def test_the_end(street: Instance) -> None:
     assert infos["agent_0"]["unserved"] == 1
 
 
-def test_the_same_seed_plays_the_same_games() -> None:
+def test_same_seed_gives_same_games() -> None:
     """The seed determines the sequence of instances; other seeds give other ones."""
 
     def games(seed: int) -> list[float]:

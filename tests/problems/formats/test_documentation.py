@@ -35,7 +35,7 @@ def example(title: str, first: str) -> str:
     return next(text for text in map(textwrap.dedent, blocks) if text.startswith(first))
 
 
-def test_the_examples_are_read(tmp_path: Path) -> None:
+def test_examples_are_read(tmp_path: Path) -> None:
     """The JSON, CSV, npz and allocation examples can be read as they stand."""
     (tmp_path / "x.json").write_text(example("Instance: JSON", "{"))
     instance = read_instance(tmp_path / "x.json")
@@ -61,7 +61,7 @@ def write_tables(folder: Path, text: str) -> None:
         (folder / name).write_text(rows.replace(" ", ""))
 
 
-def test_the_examples_of_distances_are_read(tmp_path: Path) -> None:
+def test_examples_of_distances_are_read(tmp_path: Path) -> None:
     """The table of distances and the tables by longitude and latitude can be read as they stand."""
     (tmp_path / "x.json").write_text(example("Instance: JSON", '{"format": "alloc-instance/1",\n "agents"'))
     reach = read_instance(tmp_path / "x.json").reach
@@ -79,7 +79,7 @@ def test_the_examples_of_distances_are_read(tmp_path: Path) -> None:
     assert folder.distances.distance.tolist() == [7.9, 20.5]
 
 
-def test_the_example_of_bases_is_read(tmp_path: Path) -> None:
+def test_example_of_bases_is_read(tmp_path: Path) -> None:
     """The flights of the example have the lengths given in the text."""
     (tmp_path / "x.json").write_text(example("Instance: JSON", BASES))
     reach = read_instance(tmp_path / "x.json").reach
@@ -93,13 +93,13 @@ def test_the_example_of_bases_is_read(tmp_path: Path) -> None:
         ("Instance: npz", set(FIELDS)),
     ],
 )
-def test_every_field_has_its_row(title: str, names: set[str]) -> None:
+def test_every_field_is_documented(title: str, names: set[str]) -> None:
     """The tables of the documentation name exactly the fields that the readers know."""
     cells = re.findall(r"^\| (`.*?) \|", section(title), re.MULTILINE)
     assert {name for cell in cells for name in re.findall(r"`(\w+)`", cell)} == names
 
 
-def test_every_column_is_shown() -> None:
+def test_every_column_is_documented() -> None:
     """The tables of the documentation have every column, in the order in which they are written."""
     text = section("Instance: CSV folder")
     assert ",".join(AGENT_COLUMNS) in text

@@ -32,7 +32,7 @@ TABLES = ["x/agents.csv", "x/tasks.csv", "x/distances.csv", "x/instance.json"]
 @pytest.mark.parametrize("file", ["x.json", *TABLES, "x.npz", "plan.json"])
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(mutations=st.lists(MUTATION, min_size=1, max_size=4), is_varied=st.booleans())
-def test_damaged_files(
+def test_damaged_files_give_an_instance_or_one_error(
     full: Instance, varied: Instance, file: str, mutations: list[tuple[float, int, bytes]], is_varied: bool
 ) -> None:
     """A valid file with bytes replaced, removed and inserted gives an instance or one InputError of one line."""
@@ -59,7 +59,7 @@ def test_damaged_files(
 
 @settings(max_examples=100, deadline=None)
 @given(cut=st.floats(0, 1, exclude_max=True), file=st.sampled_from(["x.json", "x.npz"]))
-def test_cut_off_files_are_refused(cut: float, file: str) -> None:
+def test_truncated_files_are_refused(cut: float, file: str) -> None:
     """No prefix of a valid file is read as if it were complete."""
     instance = Instance(ability=[1, 2], workload=[3, 4], battery=[5, 6])
     with tempfile.TemporaryDirectory() as folder:

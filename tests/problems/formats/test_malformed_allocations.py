@@ -37,7 +37,7 @@ ALLOCATIONS = [
 
 
 @pytest.mark.parametrize(("document", "place", "words"), ALLOCATIONS)
-def test_allocations_that_break_a_rule(tmp_path: Path, document: Any, place: str | None, words: str) -> None:
+def test_invalid_allocations_are_located(tmp_path: Path, document: Any, place: str | None, words: str) -> None:
     """Each fault in an allocation is told with its place."""
     text = document if isinstance(document, str) else json.dumps(document)
     (tmp_path / "plan.json").write_text(text)
@@ -46,7 +46,7 @@ def test_allocations_that_break_a_rule(tmp_path: Path, document: Any, place: str
     assert words in error.message or document == {}
 
 
-def test_front_without_points_whose_instance_is_no_name(tmp_path: Path) -> None:
+def test_instance_name_of_an_empty_front_is_checked(tmp_path: Path) -> None:
     """The name of the instance of a front is checked even where no allocation is made for it."""
     (tmp_path / "front.json").write_text('{"format": "alloc-pareto/1", "instance": 4, "points": []}')
     error = the_error(tmp_path / "front.json", lambda path: read_allocations(path, INSTANCE))

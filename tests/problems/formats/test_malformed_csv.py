@@ -131,7 +131,7 @@ def table_folder(folder: Path, files: dict[str, str | bytes]) -> Path:
 
 
 @pytest.mark.parametrize(("files", "place", "words"), TABLES)
-def test_tables_that_break_a_rule(tmp_path: Path, files: dict[str, str | bytes], place: str, words: str) -> None:
+def test_invalid_tables_are_located(tmp_path: Path, files: dict[str, str | bytes], place: str, words: str) -> None:
     """Each fault in a folder of tables is told with the file, the line as an editor counts it, and the column."""
     error = the_error(table_folder(tmp_path / "fleet", files))
     assert error.place == place, str(error)
@@ -139,7 +139,7 @@ def test_tables_that_break_a_rule(tmp_path: Path, files: dict[str, str | bytes],
 
 
 @pytest.mark.parametrize("name", ["agents.csv", "tasks.csv", "distances.csv", "instance.json"])
-def test_folders_with_odd_entries(tmp_path: Path, name: str) -> None:
+def test_tables_that_are_no_files_are_named(tmp_path: Path, name: str) -> None:
     """A table that is a folder, a pipe or a dangling link is named in the error."""
     path = table_folder(tmp_path / "fleet", {name: ""}) / name
     path.unlink()

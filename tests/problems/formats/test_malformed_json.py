@@ -61,7 +61,7 @@ JSON_TEXTS = {
 
 
 @pytest.mark.parametrize("case", JSON_TEXTS)
-def test_texts_that_are_no_instance(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, case: str) -> None:
+def test_texts_that_are_not_an_instance_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, case: str) -> None:
     """Text that is no JSON, or not the right JSON, gives its place, from a file and from standard input alike."""
     text, place, words = JSON_TEXTS[case]
     (tmp_path / "x.json").write_text(text)
@@ -224,7 +224,7 @@ DOCUMENTS = [
 
 
 @pytest.mark.parametrize(("document", "place", "words"), DOCUMENTS)
-def test_documents_that_break_a_rule(tmp_path: Path, document: dict[str, Any], place: str, words: str) -> None:
+def test_invalid_documents_are_located(tmp_path: Path, document: dict[str, Any], place: str, words: str) -> None:
     """Each rule of the format is checked, with the place of violations, for files and plain objects."""
     with pytest.raises(InputError):
         from_document(document)
@@ -234,7 +234,7 @@ def test_documents_that_break_a_rule(tmp_path: Path, document: dict[str, Any], p
     assert words in error.message
 
 
-def test_magnitudes_that_overflow(tmp_path: Path) -> None:
+def test_overflowing_magnitudes_are_refused(tmp_path: Path) -> None:
     """Finite abilities beyond the limits are refused with the limits."""
     document = changed(agents=[{"id": name, "ability": 1.7e308} for name in "ab"])
     (tmp_path / "x.json").write_text(json.dumps(document))

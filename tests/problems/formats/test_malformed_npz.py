@@ -86,7 +86,7 @@ COLUMNS = [
 
 
 @pytest.mark.parametrize(("arrays", "place", "words"), COLUMNS)
-def test_arrays_that_break_a_rule(tmp_path: Path, arrays: dict[str, Any], place: str, words: str) -> None:
+def test_invalid_arrays_are_located(tmp_path: Path, arrays: dict[str, Any], place: str, words: str) -> None:
     """Each fault in a columnar file is told with the array, and the row where there is one."""
     given = {name: value for name, value in {**ARRAYS, **arrays}.items() if value is not None}
     np.savez(tmp_path / "x.npz", **given)
@@ -149,14 +149,14 @@ BYTES = {
 
 
 @pytest.mark.parametrize("case", BYTES)
-def test_archives_that_are_none(tmp_path: Path, case: str) -> None:
+def test_invalid_archives_are_refused(tmp_path: Path, case: str) -> None:
     """Bytes that are not a columnar file are refused as such, and nothing is unpickled."""
     data, words = BYTES[case]
     (tmp_path / "x.npz").write_bytes(data)
     assert words in the_error(tmp_path / "x.npz").message
 
 
-def test_a_zip_bomb_is_not_unpacked(tmp_path: Path) -> None:
+def test_zip_bomb_is_not_unpacked(tmp_path: Path) -> None:
     """An archive of more than 4 GiB uncompressed is refused by its directory, without unpacking."""
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as file:
@@ -171,7 +171,7 @@ def test_a_zip_bomb_is_not_unpacked(tmp_path: Path) -> None:
     assert "take 8.0 GiB uncompressed; at most 4 are read" in the_error(tmp_path / "x.npz").message
 
 
-def test_the_same_array_twice(tmp_path: Path) -> None:
+def test_duplicate_arrays_are_refused(tmp_path: Path) -> None:
     """An archive with two arrays of one name is ambiguous, and refused."""
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w") as file:

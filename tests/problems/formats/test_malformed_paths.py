@@ -40,7 +40,7 @@ PATHS = [
 
 
 @pytest.mark.parametrize(("path", "words"), PATHS)
-def test_paths_that_are_no_instance(tmp_path: Path, path: str, words: str) -> None:
+def test_invalid_paths_are_refused(tmp_path: Path, path: str, words: str) -> None:
     """Files of the wrong kind, or missing ones, are reported as such, without waiting on a pipe."""
     for name in ("folder.json", "folder.npz", "folder"):
         (tmp_path / name).mkdir()
@@ -59,7 +59,7 @@ def test_paths_that_are_no_instance(tmp_path: Path, path: str, words: str) -> No
     assert str(caught.value).startswith(str(tmp_path))
 
 
-def test_devices_are_no_instances() -> None:
+def test_devices_are_refused() -> None:
     """The null device causes neither waiting nor a traceback."""
     assert "has no known format" in the_error("/dev/null").message
     instance = Instance(ability=[1], workload=[1])
@@ -67,7 +67,7 @@ def test_devices_are_no_instances() -> None:
 
 
 @pytest.mark.parametrize("file", ["x.json", "x.npz", "x"])
-def test_unreadable_files(bound: Path, file: str, full: Instance) -> None:
+def test_unreadable_files_are_reported(bound: Path, file: str, full: Instance) -> None:
     """Missing permissions are reported with a correction."""
     path = bound / file
     write_instance(full, path)
@@ -79,7 +79,7 @@ def test_unreadable_files(bound: Path, file: str, full: Instance) -> None:
         locked.chmod(stat.S_IRUSR | stat.S_IWUSR)
 
 
-def test_unreadable_files_as_the_system_tells(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_system_errors_on_reading_are_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Errors of the system on reading become one line, and so does lack of memory."""
     (tmp_path / "x.json").write_text("{}")
     for fault, words in (
@@ -95,7 +95,7 @@ def test_unreadable_files_as_the_system_tells(tmp_path: Path, monkeypatch: pytes
         assert the_error(tmp_path / "x.json").message == words
 
 
-def test_closed_standard_input(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_closed_standard_input_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     """A closed standard input is reported."""
     monkeypatch.setattr(sys, "stdin", None)
     assert the_error("-").message == "is closed"

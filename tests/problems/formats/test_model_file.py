@@ -38,7 +38,7 @@ def solved_by_highs(path: Path, instance: Instance) -> Evaluation:
 
 @pytest.mark.parametrize("model", ["class", "plain"])
 @pytest.mark.parametrize("seed", SEEDS)
-def test_optimum_of_the_model_is_that_of_brute_force(tmp_path: Path, seed: int, model: str) -> None:
+def test_optimum_of_the_model_matches_brute_force(tmp_path: Path, seed: int, model: str) -> None:
     """The least makespan, or with speeds one in time, and the least energy at it, whatever fields the instance has."""
     instance = varied_instance(seed)
     best = brute_force(instance)
@@ -56,7 +56,7 @@ def test_optimum_of_the_model_is_that_of_brute_force(tmp_path: Path, seed: int, 
 
 @pytest.mark.needs("cbcbox")
 @pytest.mark.parametrize("file_format", ["lp", "mps"])
-def test_cbc_reads_what_is_written(tmp_path: Path, file_format: str) -> None:
+def test_cbc_reads_the_model(tmp_path: Path, file_format: str) -> None:
     """Another solver also treats variables as integers, and its solution is read."""
     import cbcbox
 
@@ -71,7 +71,7 @@ def test_cbc_reads_what_is_written(tmp_path: Path, file_format: str) -> None:
         assert score.energy == pytest.approx(best.energy, rel=1e-6, abs=1e-9)
 
 
-def test_names_and_comments_tell_agents_and_tasks(tmp_path: Path) -> None:
+def test_names_and_comments_identify_agents_and_tasks(tmp_path: Path) -> None:
     """Variables are named after ids, a class after its first agent; comments list classes and renamed ids."""
     instance = Instance(
         ability=[4, 4, 2], workload=[7, 3], agent_ids=["drone 1", "d2", "ü"], task_ids=["north field", "t"]
@@ -98,7 +98,7 @@ def test_units_far_from_one_are_scaled(tmp_path: Path) -> None:
     assert solved_by_highs(tmp_path / "m.lp", instance).makespan == pytest.approx(1.0)
 
 
-def test_what_has_no_model_is_refused(tmp_path: Path) -> None:
+def test_instances_without_a_model_are_refused(tmp_path: Path) -> None:
     """Energy and speeds need a makespan; work that nobody can do, no work, and too many pairs have no model."""
     path = tmp_path / "m.lp"
     plain = Instance(ability=[1, 2], workload=[1])

@@ -22,7 +22,7 @@ DESIGN = """{"format": "alloc-instance/1", "name": "demo", "tau": 0.5, "energy_p
            {"id": "t2", "workload": 3, "position": [1, 2]}]}"""
 
 
-def test_the_documented_example(tmp_path: Path) -> None:
+def test_documented_example_is_read(tmp_path: Path) -> None:
     """Each field of the documented example lands where it belongs, and 2-D positions get z = 0."""
     (tmp_path / "x.json").write_text(DESIGN)
     instance = read_instance(tmp_path / "x.json")
@@ -38,7 +38,7 @@ def test_the_documented_example(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("file", ["small.json", "small", "small.npz"])
-def test_defaults(tmp_path: Path, file: str) -> None:
+def test_defaults_of_optional_fields(tmp_path: Path, file: str) -> None:
     """With only the required fields, the name is the file's stem and the rest is as documented, in every format."""
     path = tmp_path / file
     if path.suffix == ".json":
@@ -69,7 +69,7 @@ def test_null_means_the_default(tmp_path: Path) -> None:
     assert instance.priority.tolist() == [1, 1]
 
 
-def test_csv_as_people_write_it(tmp_path: Path) -> None:
+def test_csv_of_spreadsheets_is_read(tmp_path: Path) -> None:
     """Windows line ends, a byte order mark, spaces in the header, blank lines, no z, lists of tasks."""
     text = "\ufeffid, ability ,x,y,tasks\r\na1,1,0.5,2,t1;t2\r\n\r\na2, 3 ,,,\r\na3,1e2,1,1,;\r\n"
     (tmp_path / "agents.csv").write_bytes(text.encode())
@@ -85,13 +85,13 @@ def test_csv_as_people_write_it(tmp_path: Path) -> None:
     assert [None if tasks is None else tasks.tolist() for tasks in instance.allowed_tasks] == [[0, 1], None, []]
 
 
-def test_a_byte_order_mark_is_no_part_of_json(tmp_path: Path) -> None:
+def test_byte_order_mark_is_ignored_in_json(tmp_path: Path) -> None:
     """JSON saved by editors that put a byte order mark first is read all the same."""
     (tmp_path / "x.json").write_bytes(b"\xef\xbb\xbf" + DESIGN.encode())
     assert read_instance(tmp_path / "x.json").name == "demo"
 
 
-def test_npz_of_other_number_types(tmp_path: Path) -> None:
+def test_npz_of_other_number_types_is_read(tmp_path: Path) -> None:
     """Whole numbers, single precision, other byte orders and 2-D positions are fine in .npz."""
     np.savez_compressed(
         tmp_path / "x.npz",
@@ -122,7 +122,7 @@ def test_standard_input_and_output(monkeypatch: pytest.MonkeyPatch, capsysbinary
     assert read_instance("-").name == "instance"
 
 
-def test_a_result_stands_in_for_an_allocation(tmp_path: Path) -> None:
+def test_result_is_read_as_an_allocation(tmp_path: Path) -> None:
     """The assignment of a result file is read, its other fields are ignored, and missing agents are idle."""
     instance = Instance(ability=[1, 2, 3], workload=[4, 5])
     result = {"format": "alloc-result/1", "status": "feasible", "assignment": {"a1": "t2", "a2": None}, "new": 1}
@@ -130,7 +130,7 @@ def test_a_result_stands_in_for_an_allocation(tmp_path: Path) -> None:
     assert read_allocation(tmp_path / "r.json", instance) == (Allocation([1, -1, -1]), None)
 
 
-def test_another_instance_is_a_warning(tmp_path: Path) -> None:
+def test_allocation_for_another_instance_is_a_warning(tmp_path: Path) -> None:
     """An allocation made for an instance of another name is used, and the warning names both on one line."""
     instance = Instance(name="one\nline", ability=[1], workload=[4])
     write_allocation(Allocation([0]), instance, tmp_path / "plan.json")

@@ -38,7 +38,7 @@ def test_every_field_survives(full: Instance, same: Same, tmp_path: Path, file: 
 
 
 @pytest.mark.parametrize("file", FORMATS)
-def test_every_field_that_may_be_left_out_survives(varied: Instance, same: Same, tmp_path: Path, file: str) -> None:
+def test_every_optional_field_survives(varied: Instance, same: Same, tmp_path: Path, file: str) -> None:
     """Metric, distances, units, rates, returns, skills and needs are the same after writing and reading."""
     write_instance(varied, tmp_path / file)
     same(varied, read_instance(tmp_path / file))
@@ -67,7 +67,7 @@ def test_fields_that_are_not_used_are_not_written(full: Instance, tmp_path: Path
 
 @settings(max_examples=150, deadline=None)
 @given(instances(), st.permutations(FORMATS))
-def test_any_instance_passes_through_all_formats(instance: Instance, order: list[str]) -> None:
+def test_instances_survive_all_formats(instance: Instance, order: list[str]) -> None:
     """An instance does not change when written and read in all three formats, in any order."""
     with tempfile.TemporaryDirectory() as folder:
         current = instance
@@ -79,13 +79,13 @@ def test_any_instance_passes_through_all_formats(instance: Instance, order: list
 
 @settings(max_examples=100, deadline=None)
 @given(instances())
-def test_documents_are_plain_json(instance: Instance) -> None:
+def test_documents_survive_the_json_module(instance: Instance) -> None:
     """A document goes through the json module, and back to the same instance, without files."""
     assert_same(instance, from_document(json.loads(json.dumps(to_document(instance), allow_nan=False))))
 
 
 @pytest.mark.parametrize("file", FORMATS)
-def test_the_same_instance_gives_the_same_bytes(tmp_path: Path, file: str) -> None:
+def test_same_instance_gives_the_same_bytes(tmp_path: Path, file: str) -> None:
     """Writing is deterministic, so that files can be compared and cached."""
     contents = []
     for number in (1, 2):
@@ -129,7 +129,7 @@ def test_allocations_survive(data: st.DataObject) -> None:
         assert list(json.loads(path.read_text("utf-8"))["assignment"]) == list(instance.agent_ids)
 
 
-def test_distances_of_another_instance_do_not_stay(
+def test_distances_of_a_replaced_instance_are_removed(
     varied: Instance, full: Instance, same: Same, tmp_path: Path
 ) -> None:
     """In a folder of tables, an instance without distances replaces one with them, and other files are kept."""
@@ -156,7 +156,7 @@ def test_geographic_tables_name_their_coordinates(varied: Instance, tmp_path: Pa
     st.lists(st.tuples(st.floats(-180, 360), st.floats(-90, 90), st.floats(-1e60, 1e60)), min_size=1, max_size=3),
     st.permutations(FORMATS),
 )
-def test_places_on_the_earth_survive(places: list[tuple[float, float, float]], order: list[str]) -> None:
+def test_geographic_positions_survive(places: list[tuple[float, float, float]], order: list[str]) -> None:
     """Longitude, latitude and altitude are exact after writing and reading in all formats."""
     instance = Instance(ability=[1] * len(places), workload=[1], agent_position=places, metric="geographic")
     with tempfile.TemporaryDirectory() as folder:

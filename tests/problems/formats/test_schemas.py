@@ -29,7 +29,7 @@ BEYOND += ("id of two of the", "joins two agents", "that an earlier row gives", 
 
 
 @pytest.mark.parametrize("name", SCHEMAS)
-def test_schemas_are_schemas(name: str) -> None:
+def test_schemas_are_valid(name: str) -> None:
     """Each is valid by the draft that it names, and describes the format of its name."""
     found = schema(name)
     assert found["$schema"] == Draft202012Validator.META_SCHEMA["$id"]
@@ -54,7 +54,7 @@ def shown(text: str) -> list[Any]:
     return [json.loads(block) for block in blocks]
 
 
-def test_documents_show_what_is_valid() -> None:
+def test_documented_examples_are_valid() -> None:
     """Every example of a format in the documents, and every file of the examples, is valid by its schema."""
     documents = [document for text in TEXTS.values() for document in shown(text)]
     assert {document["format"] for document in documents} >= {f"alloc-{name}/1" for name in ("instance", "result")}
@@ -66,7 +66,7 @@ def test_documents_show_what_is_valid() -> None:
 @pytest.mark.parametrize(
     "document", [document for document, _, words in DOCUMENTS if not any(word in words for word in BEYOND)]
 )
-def test_documents_that_break_a_rule_are_invalid(document: dict[str, Any]) -> None:
+def test_documents_refused_by_the_reader_are_invalid(document: dict[str, Any]) -> None:
     """Documents refused by the reader are invalid by the schema, except for rules that schemas cannot express."""
     assert list(Draft202012Validator(schema("alloc-instance/1")).iter_errors(document)) != []
 
@@ -118,7 +118,7 @@ def test_reader_and_schema_agree(varied: Instance) -> None:
     assert min(counts.values()) > 100
 
 
-def test_missing_and_unknown_fields_of_instances_are_faults(varied: Instance) -> None:
+def test_missing_and_unknown_fields_of_instances_are_invalid(varied: Instance) -> None:
     """Each required field that is left out, and any field that is not known, is a fault; others may be left out."""
     document: dict[str, Any] = json.loads(json.dumps(to_document(varied)))
     validator = Draft202012Validator(schema("alloc-instance/1"))
@@ -142,7 +142,7 @@ def test_missing_and_unknown_fields_of_instances_are_faults(varied: Instance) ->
         del part["nonsense"]
 
 
-def test_results_and_fronts_without_a_field_are_faults(small: Instance) -> None:
+def test_results_and_fronts_with_missing_fields_are_invalid(small: Instance) -> None:
     """Written documents are valid, but not if a field is missing or has another type; additional fields are allowed."""
     result = solve(small, "greedy", time_limit_s=1)
     documents = [result.to_dict(), pareto(small, "local-search", points=2, iterations=10).to_dict()]
@@ -156,13 +156,13 @@ def test_results_and_fronts_without_a_field_are_faults(small: Instance) -> None:
             assert name == "format" or faults({**document, name: {"x": [1]}}, strict=False) != [], name
 
 
-def test_there_is_an_error_for_other_names() -> None:
+def test_unknown_formats_are_errors() -> None:
     """An unknown name is an error with the most similar name."""
     with pytest.raises(InputError, match=r"no format 'instances' \(did you mean 'alloc-instance/1'\?\)"):
         schema("instances")
 
 
-def test_the_fleet_uses_every_field() -> None:
+def test_fleet_example_uses_every_field() -> None:
     """The example of a fleet on the earth is read, with speeds in km per minute, and has all the later fields."""
     fleet = read_instance(ROOT / "examples" / "fleet" / "fleet.json")
     assert fleet.metric == "geographic"

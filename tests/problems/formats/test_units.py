@@ -72,7 +72,7 @@ def test_labels_without_a_unit_of_speed_convert_nothing(tmp_path: Path, name: st
     assert instance.units == Units(distance="Seemeilen", time="h", work="Stück")
 
 
-def test_empty_labels_are_none() -> None:
+def test_empty_labels_are_no_labels() -> None:
     """Null and an empty text are the same as no label, and are not written."""
     row = {"agents": [{"id": "a", "ability": 1}], "tasks": [{"id": "t", "workload": 1}]}
     document = {"format": "alloc-instance/1", "units": {"time": None, "work": "", "energy": "J"}, **row}

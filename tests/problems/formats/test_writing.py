@@ -19,7 +19,7 @@ def leftovers(folder: Path) -> list[str]:
     return [name for name in os.listdir(folder) if name.startswith(".alloc-")]
 
 
-def test_an_interrupted_write_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_interrupted_write_keeps_the_old_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """If renaming fails or the user interrupts, the old content is kept and no temporary file is left."""
     path = tmp_path / "x.json"
     path.write_text("old")
@@ -36,7 +36,7 @@ def test_an_interrupted_write_leaves_the_old_file(tmp_path: Path, monkeypatch: p
         assert leftovers(tmp_path) == []
 
 
-def test_a_failing_disk_is_an_input_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_failing_disk_is_an_input_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A full disk is reported with the file and the reason, in one line."""
 
     def full(*arguments: object) -> None:
@@ -47,7 +47,7 @@ def test_a_failing_disk_is_an_input_error(tmp_path: Path, monkeypatch: pytest.Mo
         write_instance(paper(1, 0), tmp_path / "x.json")
 
 
-def test_permissions(tmp_path: Path) -> None:
+def test_file_permissions(tmp_path: Path) -> None:
     """A new file gets mode 0666 minus the umask; a replaced one keeps its mode."""
     before = os.umask(0o027)
     try:
@@ -61,7 +61,7 @@ def test_permissions(tmp_path: Path) -> None:
         os.umask(before)
 
 
-def test_a_link_stays_a_link(tmp_path: Path) -> None:
+def test_symbolic_links_are_followed(tmp_path: Path) -> None:
     """Writing through a symbolic link replaces what it points to."""
     (tmp_path / "real").write_text("old")
     (tmp_path / "link").symlink_to("real")
@@ -100,7 +100,7 @@ def test_devices_are_written_to_not_replaced(tmp_path: Path) -> None:
         ("x" * 300, "cannot be written: file name too long"),
     ],
 )
-def test_where_nothing_can_be_written(tmp_path: Path, path: str, words: str) -> None:
+def test_unwritable_paths_are_reported(tmp_path: Path, path: str, words: str) -> None:
     """Every path that is not writable gives one line with the path and the reason."""
     (tmp_path / "file").write_text("")
     (tmp_path / "folder.json").mkdir()
@@ -112,7 +112,7 @@ def test_where_nothing_can_be_written(tmp_path: Path, path: str, words: str) -> 
     assert leftovers(tmp_path) == []
 
 
-def test_a_protected_file_is_not_replaced(bound: Path) -> None:
+def test_write_protected_file_is_not_replaced(bound: Path) -> None:
     """A file without write permission is not replaced, although its folder would allow it."""
     path = bound / "x.json"
     path.write_text("old")
@@ -125,7 +125,7 @@ def test_a_protected_file_is_not_replaced(bound: Path) -> None:
 @pytest.mark.parametrize("path", ["x.json", "x", "x.npz"])
 @pytest.mark.parametrize("field", ["name", "agent_ids", "task_ids"])
 @pytest.mark.parametrize("text", ["a\0", "\ud800"])
-def test_what_cannot_be_read_back_is_not_written(tmp_path: Path, path: str, field: str, text: str) -> None:
+def test_unreadable_names_are_not_written(tmp_path: Path, path: str, field: str, text: str) -> None:
     """NUL and lone surrogates in names are refused before writing, in every format."""
     value = text if field == "name" else [text]
     instance = Instance(ability=[1], workload=[1], **{field: value})  # type: ignore[arg-type]
@@ -136,7 +136,7 @@ def test_what_cannot_be_read_back_is_not_written(tmp_path: Path, path: str, fiel
     assert os.listdir(tmp_path) == []
 
 
-def test_cells_longer_than_csv_readers_take(tmp_path: Path) -> None:
+def test_cells_too_long_for_csv_readers_are_refused(tmp_path: Path) -> None:
     """A list of tasks that is too long for CSV readers is refused with an alternative; other formats keep it."""
     ids = [f"{'t' * 40}{j}" for j in range(4000)]
     instance = Instance(ability=[1], workload=[1] * 4000, task_ids=ids, allowed_tasks=[range(3999)])
@@ -158,14 +158,14 @@ def test_existing_folders_are_updated(tmp_path: Path) -> None:
     assert leftovers(tmp_path / "fleet.v2") == []
 
 
-def test_standard_output_without_bytes(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_text_only_standard_output_gets_text(monkeypatch: pytest.MonkeyPatch) -> None:
     """Standard output that takes text only, as under contextlib.redirect_stdout, gets text."""
     monkeypatch.setattr(sys, "stdout", io.StringIO())
     write_text_atomically("-", "Zoë")
     assert sys.stdout.getvalue() == "Zoë"  # type: ignore[attr-defined]
 
 
-def test_a_reader_that_left_is_not_the_inputs_fault(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_broken_pipe_is_passed_on(monkeypatch: pytest.MonkeyPatch) -> None:
     """A broken pipe is passed on as such, for the program to end quietly."""
 
     class Closed(io.BytesIO):
@@ -179,7 +179,7 @@ def test_a_reader_that_left_is_not_the_inputs_fault(monkeypatch: pytest.MonkeyPa
 
 @pytest.mark.parametrize("step", ["open", "replace"])
 @pytest.mark.parametrize("number", [errno.EBUSY, errno.EACCES, errno.EROFS, errno.EXDEV, errno.EPERM])
-def test_where_nothing_can_be_moved_it_is_written_in_place(
+def test_files_that_cannot_be_renamed_are_overwritten(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, step: str, number: int
 ) -> None:
     """A file that is a mount point, or in a read-only folder, is overwritten, and longer content is truncated."""
@@ -199,7 +199,7 @@ def test_where_nothing_can_be_moved_it_is_written_in_place(
     assert leftovers(tmp_path) == []
 
 
-def test_a_full_disk_leaves_what_is_overwritten_in_place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_full_disk_keeps_the_content_of_overwritten_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """If there is not enough space, the old content is kept, also for files overwritten in place."""
 
     def fail(number: int) -> None:
@@ -216,7 +216,7 @@ def test_a_full_disk_leaves_what_is_overwritten_in_place(tmp_path: Path, monkeyp
 
 @pytest.mark.parametrize("name", ["/dev/fd/{}", "/proc/self/fd/{}", "link", "link.json"])
 @pytest.mark.parametrize("mode", ["ab", "wb"])
-def test_open_descriptors_are_written_to_where_they_stand(tmp_path: Path, name: str, mode: str) -> None:
+def test_open_descriptors_are_written_at_their_position(tmp_path: Path, name: str, mode: str) -> None:
     """Earlier content of an open file is kept, with and without append mode, and the file is not replaced."""
     (tmp_path / "log").write_text("before\n")
     with (tmp_path / "log").open(mode) as log:
@@ -236,7 +236,7 @@ def test_open_descriptors_are_written_to_where_they_stand(tmp_path: Path, name: 
     assert '"format": "alloc-instance/1"' in "".join(lines)
 
 
-def test_pipes_take_instances_without_a_suffix(tmp_path: Path) -> None:
+def test_pipes_without_a_suffix_get_json(tmp_path: Path) -> None:
     """Process substitutions of a shell and named pipes get JSON, as standard output does."""
     begin, end = os.pipe()
     write_instance(Instance(ability=[1], workload=[1]), f"/dev/fd/{end}")
@@ -251,7 +251,7 @@ def test_pipes_take_instances_without_a_suffix(tmp_path: Path) -> None:
         os.close(descriptor)
 
 
-def test_descriptors_that_take_nothing_are_found_before(tmp_path: Path) -> None:
+def test_unwritable_descriptors_are_found_before_writing(tmp_path: Path) -> None:
     """A closed or read-only descriptor gives the same error on checking and on writing."""
     begin, end = os.pipe()
     os.close(end)
@@ -263,7 +263,7 @@ def test_descriptors_that_take_nothing_are_found_before(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("path", ["absent/x.json", "folder.json", "file/x.json", "nul\0.json", "x" * 300 + ".json"])
-def test_the_check_finds_what_the_write_would(tmp_path: Path, path: str) -> None:
+def test_check_before_a_run_matches_writing(tmp_path: Path, path: str) -> None:
     """The check before a run gives the same errors as writing, and leaves no files."""
     (tmp_path / "file").write_text("")
     (tmp_path / "folder.json").mkdir()

@@ -19,7 +19,7 @@ def fields(board: Board) -> dict[str, torch.Tensor]:
     return {name: getattr(board, name) for name in Board.__dataclass_fields__}
 
 
-def test_units_by_hand(board: Board) -> None:
+def test_units_match_hand_calculation(board: Board) -> None:
     """Abilities and needs are in units of the mean ability, 2 here; distances have a mean of 0.66 where legal."""
     assert board.ability.tolist() == [[0.5, 1.0, 1.5]]
     assert board.need.tolist() == [[2.0, 1.0, 0.0]]
@@ -30,18 +30,18 @@ def test_units_by_hand(board: Board) -> None:
     assert board.log_tau.item() == pytest.approx(2 * np.log(0.5))
 
 
-def test_the_reference_makespan_sets_the_needs(pair: Instance) -> None:
+def test_reference_makespan_determines_the_needs(pair: Instance) -> None:
     """Twice the hours, half the ability needed."""
     assert layout(pair, hours=2.0).need.tolist() == [[1.0, 0.5, 0.0]]
 
 
-def test_supply_and_choice_by_hand(board: Board) -> None:
+def test_supply_and_reachable_share_match_hand_calculation(board: Board) -> None:
     """All 3 mean abilities reach the first task, which needs 2; 2.5 reach the second, which needs 1."""
     assert board.supply_ratio[0, :2].tolist() == pytest.approx([np.log(1.5) / 2 - 1, np.log(2.5) / 2 - 1])
     assert board.reachable_share[0].tolist() == pytest.approx([2 / 3, 1, 1])
 
 
-def test_weights_are_priorities_over_their_mean() -> None:
+def test_weights_are_priorities_relative_to_their_mean() -> None:
     """Tasks without workload do not count; where nobody has a priority, all weigh the same."""
     tasks = {"ability": [1], "workload": [1, 1, 0]}
     assert layout(Instance(**tasks, priority=[1, 3, 7])).weight.tolist() == [[0.5, 1.5, 0.0, 0.0]]
@@ -49,12 +49,12 @@ def test_weights_are_priorities_over_their_mean() -> None:
     assert layout(Instance(**tasks, priority=[1e308, 1e308, 1e308])).weight.tolist() == [[1.0, 1.0, 0.0, 0.0]]
 
 
-def test_agents_begin_at_the_nearest_task_in_reach(board: Board) -> None:
+def test_agents_start_at_the_nearest_task_in_reach(board: Board) -> None:
     """Without a start task, an agent begins where it has least to fly."""
     assert board.start.tolist() == [[0, 1, 0]]
 
 
-def test_a_start_task_is_where_an_agent_begins() -> None:
+def test_start_task_takes_precedence() -> None:
     """A start task counts, unless the agent cannot take it; who can take nothing is idle."""
     instance = Instance(
         ability=[1, 1, 1],
@@ -66,7 +66,7 @@ def test_a_start_task_is_where_an_agent_begins() -> None:
     assert layout(instance).start.tolist() == [[1, 0, 2]]
 
 
-def test_a_plan_is_where_agents_begin(pair: Instance) -> None:
+def test_plan_takes_precedence_over_start_tasks(pair: Instance) -> None:
     """A plan goes before the start; whom it sends astray begins as without it."""
     assert layout(pair, plan=np.array([1, 0, IDLE])).start.tolist() == [[0, 0, 2]]
 
@@ -80,7 +80,7 @@ def test_ties_are_broken_by_the_generator() -> None:
     assert set(starts[0].flatten().tolist()) == {0, 1, 2, 3}
 
 
-def test_late_arrivals_bring_less() -> None:
+def test_travel_time_reduces_ability() -> None:
     """An agent that flies for half of the reference makespan brings half its ability, and nothing after all of it."""
     instance = Instance(
         ability=[2, 2],
@@ -95,7 +95,7 @@ def test_late_arrivals_bring_less() -> None:
 
 
 @given(instances(speeds=False))
-def test_legal_is_reach(instance: Instance) -> None:
+def test_legal_actions_match_reach(instance: Instance) -> None:
     """Without travel times an agent may go where it can reach something to do, and be idle."""
     board = layout(instance)
     expected = reachable(instance)[1] & (instance.workload > 0)
@@ -105,7 +105,7 @@ def test_legal_is_reach(instance: Instance) -> None:
 
 
 @given(instances(speeds=False), st.randoms(use_true_random=False))
-def test_group_ability_is_that_of_the_evaluator(instance: Instance, random) -> None:
+def test_group_abilities_match_the_evaluator(instance: Instance, random) -> None:
     """Groups of a board, times the mean ability, are the W_j of `evaluate`."""
     board = layout(instance)
     options = [[-1, *np.flatnonzero(row).tolist()] for row in board.legal[0, :, :-1].numpy()]
@@ -116,7 +116,7 @@ def test_group_ability_is_that_of_the_evaluator(instance: Instance, random) -> N
     assert torch.equal(group_ability(board, state.slot), state.group)
 
 
-def test_games_are_chosen_by_number() -> None:
+def test_games_are_selected_by_index() -> None:
     """A board of chosen games has these, in this order, and a game may be chosen twice."""
     games = [paper_like(8, 3, 30, seed) for seed in range(3)]
     chosen = layout(*games)[torch.tensor([2, 0, 2])]
@@ -124,7 +124,7 @@ def test_games_are_chosen_by_number() -> None:
         assert torch.equal(value, getattr(chosen, name)), name
 
 
-def test_boards_of_several_instances_are_those_of_each() -> None:
+def test_boards_of_several_instances_match_single_boards() -> None:
     """Games side by side are laid out as each by itself."""
     games = [paper_like(8, 3, 30, seed) for seed in range(3)]
     together = layout(*games)
@@ -164,12 +164,12 @@ def test_layout_is_always_finite(name: str, hours: float, near: int | None) -> N
     assert bool((current_tasks(board, reset(board)) < board.places).all())
 
 
-def test_a_large_mean_ability_keeps_the_discount() -> None:
+def test_large_mean_ability_keeps_log_tau() -> None:
     """0.5^500 is 0 in single precision; its logarithm is not."""
     assert layout(Instance(ability=[500], workload=[1])).log_tau.item() == pytest.approx(500 * np.log(0.5))
 
 
-def test_instances_must_match_their_figures(pair: Instance) -> None:
+def test_number_of_reference_makespans_must_match(pair: Instance) -> None:
     """A reference makespan per instance, not fewer."""
     with pytest.raises(ValueError, match="shorter"):
         make_board([pair, pair], [1.0], [0.5, 0.5], np.random.default_rng(0))

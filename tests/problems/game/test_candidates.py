@@ -24,7 +24,7 @@ def spread(request: pytest.FixtureRequest) -> Instance:
     )
 
 
-def test_near_tasks_by_hand() -> None:
+def test_nearest_candidates_match_hand_calculation() -> None:
     """Of five tasks on a line, an agent at 0 has the two nearest that it may do and that need anything."""
     instance = Instance(
         ability=[1],
@@ -39,14 +39,14 @@ def test_near_tasks_by_hand() -> None:
     assert legal.all()
 
 
-def test_missing_candidates_are_barred() -> None:
+def test_padding_candidates_are_illegal() -> None:
     """Who can take fewer tasks than it has candidates has places left over that nobody can go to."""
     instance = Instance(ability=[1], workload=[1, 1, 1], allowed_tasks=[[1]])
     goal, _, _, legal = candidate_tasks(instance, 2, None)
     assert goal[legal].tolist() == [1, 3]
 
 
-def test_candidates_differ(spread: Instance) -> None:
+def test_candidates_are_distinct(spread: Instance) -> None:
     """No agent has a task twice, and idleness comes last."""
     goal, _, _, legal = candidate_tasks(spread, 6, None)
     for row, allowed in zip(goal, legal, strict=True):
@@ -54,7 +54,7 @@ def test_candidates_differ(spread: Instance) -> None:
     assert (goal[:, -1] == spread.m).all()
 
 
-def test_candidates_hold_start_and_plan(spread: Instance) -> None:
+def test_candidates_include_start_and_plan(spread: Instance) -> None:
     """Where an agent begins and where a plan has it are among its candidates."""
     plan = np.random.default_rng(0).integers(-1, spread.m, spread.n)
     goal, _, _, _ = candidate_tasks(spread, 3, plan)
@@ -63,14 +63,14 @@ def test_candidates_hold_start_and_plan(spread: Instance) -> None:
 
 
 @pytest.mark.parametrize("near", [20, 25, None])
-def test_enough_candidates_are_all(spread: Instance, near: int | None) -> None:
+def test_board_is_dense_with_enough_candidates(spread: Instance, near: int | None) -> None:
     """With as many candidates as tasks the board is the dense one."""
     dense, board = layout(spread), layout(spread, near=near)
     for name in Board.__dataclass_fields__:
         assert torch.equal(getattr(dense, name), getattr(board, name)), name
 
 
-def test_near_candidates_look_as_in_the_dense_board(spread: Instance) -> None:
+def test_sparse_candidates_match_the_dense_board(spread: Instance) -> None:
     """Candidates have the distance, up to the scale, and the legality that they have among all tasks."""
     goal, distance, _, legal = candidate_tasks(spread, 6, None)
     _, far, _, able = candidate_tasks(spread, None, None)
@@ -79,7 +79,7 @@ def test_near_candidates_look_as_in_the_dense_board(spread: Instance) -> None:
     np.testing.assert_array_equal(distance[legal], far[rows, goal][legal])
 
 
-def test_scarce_tasks_find_agents() -> None:
+def test_isolated_tasks_have_candidate_agents() -> None:
     """A task that is far from everybody is a candidate of agents near it with ample ability, the nearest among them."""
     place = np.column_stack([np.linspace(0, 1, 30), np.zeros(30)])
     sites = np.vstack([np.column_stack([np.linspace(0, 1, 11), np.zeros(11)]), [[1.0, 9.0]]])
@@ -99,7 +99,7 @@ def test_every_task_that_can_be_served_is_a_candidate() -> None:
         assert set(range(40)) <= set(goal[legal].tolist())
 
 
-def test_near_candidates_on_the_papers_instances() -> None:
+def test_sparse_candidates_on_paper_instances() -> None:
     """Everybody begins at its start task on a board of near candidates as on the dense one."""
     instance = paper_like(50, 20, 210, 0)
     for board in (layout(instance), layout(instance, near=5)):

@@ -33,7 +33,7 @@ from alloc.problems.game import (
 OBSERVE = (observe_pairs, observe_agents, observe_tasks)
 
 
-def test_pairs_by_hand(board: Board) -> None:
+def test_pair_features_match_hand_calculation(board: Board) -> None:
     """The third agent, of ability 1.5, at the first task, which has just the 2 it needs, bids for the second.
 
     That task needs 1 and has 1; the agent is 0.2 away from its own and 0.8 from that one, times 1.65.
@@ -69,13 +69,13 @@ def test_pairs_by_hand(board: Board) -> None:
     )
 
 
-def test_agents_by_hand(board: Board) -> None:
+def test_agent_features_match_hand_calculation(board: Board) -> None:
     """The second agent, of ability 1, alone at the second task, 0.1 * 1.65 away, which needs 1."""
     seen = observe_agents(board, reset(board))[0, 1].tolist()
     assert seen == pytest.approx([0, 0, 1, 1, 0.165, 0.0825, 1, 0], abs=1e-6)
 
 
-def test_tasks_by_hand(board: Board) -> None:
+def test_task_features_match_hand_calculation(board: Board) -> None:
     """With groups of 0.5 for 2 and of 2.5 for 1: short by 1.5 of 3 and by half of the mean, with 1.5 to spare."""
     seen = observe_tasks(board, state_of(board, np.array([0, 1, 1])))[0]
     short = [0.75, 0.5, 2, np.log(2) - 1.5, 0.5 - 1, np.log(2) - 1.5, 0]
@@ -128,7 +128,7 @@ def test_extremes_stay_finite(name: str, hours: float, reward: Reward, flying: b
 
 
 @given(instances(speeds=False), st.integers(0, 99))
-def test_names_do_not_matter(instance: Instance, seed: int) -> None:
+def test_observations_are_permutation_equivariant(instance: Instance, seed: int) -> None:
     """Agents and tasks in another order are seen in that order, and nothing else changes."""
     # a start task without a position would be lost in the relabelled instance
     instance = replace(instance, task_position=np.nan_to_num(instance.task_position))

@@ -16,7 +16,7 @@ from alloc.problems.game.regions import lay_out_regions
 
 @pytest.mark.parametrize("speed", [None, (0.5, 2.0)])
 @pytest.mark.parametrize("dimensions", [2, 3])
-def test_a_region_is_laid_out_as_an_instance_of_its_own(speed, dimensions: int) -> None:
+def test_region_matches_the_board_of_its_own_instance(speed, dimensions: int) -> None:
     """Each game on a region is that of the instance with these agents and tasks alone, but for the battery."""
     family = Family(
         agents=14, tasks=6, starts="own", communication_range=(0.4, 1.5), speed=speed, priority=(1, 3),
@@ -65,7 +65,7 @@ def test_merge_applies_accepted_games() -> None:
     assert both.tolist() == [IDLE, 0, 1, 2, IDLE]
 
 
-def test_a_region_is_the_same_game_beside_a_larger_one() -> None:
+def test_padding_does_not_change_a_region() -> None:
     """Padding agents are neither counted nor seen: observations and rewards are those of the region alone."""
     instance = random_instance(Family(agents=40, tasks=6), 2)
     plan = np.array([0, 1, 2, *[3, 4, 5] * 12, IDLE])

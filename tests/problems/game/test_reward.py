@@ -52,19 +52,19 @@ def somewhere(board: Board, state: State, rules: Rules, seed: int) -> torch.Tens
     return draws.masked_fill(~can, -1.0).argmax(2)
 
 
-def test_potential_by_hand(board: Board) -> None:
+def test_potential_matches_hand_calculation(board: Board) -> None:
     """With shortfalls of 1.5 of 2 and 0 of 1 mean abilities, the potential is -4 * 1.5/3 - 2 * 0.75/2 - 0.75."""
     group = torch.tensor([[0.5, 2.5, 0.0]])
     assert potential(board, group).item() == pytest.approx(-2 - 0.75 - 0.75)
     assert potential(board, torch.tensor([[2.0, 1.0, 0.0]])).item() == 0
 
 
-def test_coverage_by_hand(board: Board) -> None:
+def test_coverage_matches_hand_calculation(board: Board) -> None:
     """(3) in the instance's units: -(0.5^(1 - 4) + 0.5^(5 - 2)) / 2 for groups of 1 and 5."""
     assert coverage(board, torch.tensor([[0.5, 2.5, 0.0]])).item() == pytest.approx(-(8 + 1 / 8) / 2)
 
 
-def test_rewards_take_many_groups_at_once(board: Board) -> None:
+def test_rewards_accept_leading_axes(board: Board) -> None:
     """Further axes in front are further states of the same games."""
     group = torch.tensor([[[0.5, 2.5, 0.0]], [[2.0, 1.0, 0.0]]])
     for reward in (potential, coverage):
@@ -72,13 +72,13 @@ def test_rewards_take_many_groups_at_once(board: Board) -> None:
         assert torch.equal(reward(board, group), each)
 
 
-def test_utility_by_hand(board: Board) -> None:
+def test_utility_matches_hand_calculation(board: Board) -> None:
     """The weight of energy is 0.5 per mean distance of an agent, (0 + 0.1 + 0.8) * 1.65 / 3 here."""
     state = state_of(board, np.array([0, 1, 1]))
     assert utility(board, state).item() == pytest.approx(-3.5 - 0.5 * 0.9 * 1.65 / 3)
 
 
-def test_coverage_is_that_of_the_evaluator() -> None:
+def test_coverage_matches_the_evaluator() -> None:
     """With equal priorities and workloads > 0, (3) over the number of tasks is the evaluator's reward over it."""
     for seed in range(30):
         instance = tiny_instance(seed)
@@ -90,7 +90,7 @@ def test_coverage_is_that_of_the_evaluator() -> None:
         assert coverage(board, state.group).item() == pytest.approx(expected, rel=1e-4)
 
 
-def test_coverage_goes_on_along_its_tangent() -> None:
+def test_coverage_is_continued_along_its_tangent() -> None:
     """Beyond `LARGEST_EXPONENT` (3) is continued without a jump or a bend, keeps falling, and never overflows."""
     board = layout(Instance(ability=[1], workload=[1], tau=0.5))
     limit = LARGEST_EXPONENT / np.log(2)  # mean abilities short at which the exponent is reached
@@ -109,7 +109,7 @@ def test_coverage_goes_on_along_its_tangent() -> None:
 
 
 @given(instances(), st.integers(0, 99), st.sampled_from(RULES))
-def test_marginal_contributions_add_up(instance: Instance, seed: int, rules: Rules) -> None:
+def test_marginal_contributions_sum_to_the_increase_of_utility(instance: Instance, seed: int, rules: Rules) -> None:
     """What granted bids bring is the rise of the utility, and what each brings is that of granting it by itself."""
     board = layout(instance)
     state, generator = reset(board), torch.Generator().manual_seed(seed)
@@ -128,7 +128,7 @@ def test_marginal_contributions_add_up(instance: Instance, seed: int, rules: Rul
         so_far = now
 
 
-def test_what_is_no_bid_brings_nothing(board: Board) -> None:
+def test_reserve_and_padding_contribute_nothing(board: Board) -> None:
     """The reserve and what fills up bring 0, wherever they stand."""
     state = reset(board)
     brought = marginal_contributions(board, state, torch.tensor([[9, -1]]))
@@ -136,7 +136,7 @@ def test_what_is_no_bid_brings_nothing(board: Board) -> None:
 
 
 @given(instances(), st.integers(0, 99), st.sampled_from(RULES))
-def test_difference_rewards_by_brute_force(instance: Instance, seed: int, rules: Rules) -> None:
+def test_difference_rewards_match_brute_force(instance: Instance, seed: int, rules: Rules) -> None:
     """The reward of an agent is the utility of what all did, less that had it alone stayed."""
     board = layout(instance)
     state = step(board, reset(board), somewhere(board, reset(board), rules, seed))
@@ -153,7 +153,7 @@ def test_difference_rewards_by_brute_force(instance: Instance, seed: int, rules:
 
 
 @given(instances(speeds=False), st.floats(0.1, 10), st.integers(0, 99))
-def test_time_is_that_of_the_evaluator(instance: Instance, hours: float, seed: int) -> None:
+def test_makespan_matches_the_evaluator(instance: Instance, hours: float, seed: int) -> None:
     """Times the reference, it is the makespan of the served tasks; and as many tasks are unserved."""
     board = layout(instance, hours=hours)
     state = step(board, reset(board), somewhere(board, reset(board), PLANNING, seed))
@@ -164,7 +164,7 @@ def test_time_is_that_of_the_evaluator(instance: Instance, hours: float, seed: i
 
 
 @given(instances(), st.floats(0.1, 10), st.integers(0, 99))
-def test_needs_are_met_when_all_is_done_in_time(instance: Instance, hours: float, seed: int) -> None:
+def test_needs_are_met_iff_makespan_is_within_the_reference(instance: Instance, hours: float, seed: int) -> None:
     """With travel times too, all needs are met if and only if the makespan is within the reference."""
     board = layout(instance, hours=hours)
     state = step(board, reset(board), somewhere(board, reset(board), PLANNING, seed))
@@ -174,7 +174,7 @@ def test_needs_are_met_when_all_is_done_in_time(instance: Instance, hours: float
     assert (potential(board, state.group).item() > -1e-5) == (makespan <= hours)
 
 
-def test_the_last_term_of_the_potential_is_the_makespan() -> None:
+def test_last_term_of_the_potential_is_the_makespan() -> None:
     """1 - T_ref / T of a plan by hand: groups of 3 and 1 for 2 and 2 at T_ref = 1 take 2 h."""
     board = layout(Instance(ability=[2, 1, 1], workload=[2, 2], start_task=[0, 0, 1]))
     assert relative_makespan(board, reset(board).group)[0].item() == 2
@@ -214,7 +214,7 @@ def test_coverage_and_makespan_differ_at_other_loads() -> None:
 
 
 @pytest.mark.parametrize("reward", list(Reward))
-def test_the_reward_ranks_plans_as_its_objective(reward: Reward) -> None:
+def test_reward_ranks_plans_by_the_objective(reward: Reward) -> None:
     """At balanced load the utility of the game is highest at the same plan for both rewards."""
     board = layout(Instance(ability=[3, 1, 1, 1], workload=[4, 2]), energy_weight=0.0)
     slots = torch.tensor(list(itertools.product(range(2), repeat=4)))
@@ -226,7 +226,7 @@ def test_the_reward_ranks_plans_as_its_objective(reward: Reward) -> None:
 
 
 @pytest.mark.parametrize("reward", list(Reward))
-def test_priorities_say_who_is_served_first(reward: Reward) -> None:
+def test_higher_priority_gives_higher_utility(reward: Reward) -> None:
     """Of two equal tasks without anybody, the agent is utility more at the one of higher priority."""
     for priority in ([1, 3], [3, 1]):
         instance = Instance(ability=[1, 1], workload=[2, 2], priority=priority)
@@ -239,14 +239,14 @@ def test_priorities_say_who_is_served_first(reward: Reward) -> None:
 
 
 @pytest.mark.parametrize("reward", list(Reward))
-def test_equal_priorities_are_none(pair: Instance, reward: Reward) -> None:
+def test_equal_priorities_have_no_effect(pair: Instance, reward: Reward) -> None:
     """Priorities that are all the same, whatever they are, change no reward."""
     rules = Rules(reward=reward)
     one, other = (layout(instance) for instance in (pair, replace(pair, priority=[5, 5])))
     assert utility(one, reset(one), rules).item() == utility(other, reset(other), rules).item()
 
 
-def test_energy_counts_by_its_weight(route: Instance) -> None:
+def test_energy_is_weighted(route: Instance) -> None:
     """A flight of 3 lowers the utility by its weight times the mean distance: 3 of two agents' here."""
     board = layout(route, energy_weight=0.25)
     unit = board.scale.item()

@@ -81,7 +81,7 @@ def test_grants_are_a_greedy_matching(most: int | None, reserve: float, ties: bo
         assert granted == greedy_matching(board, state, tensor.numpy(), reserve, most)
 
 
-def test_games_side_by_side_grant_what_each_grants_alone() -> None:
+def test_batched_games_grant_as_single_ones() -> None:
     """What other games do changes nothing; games that end sooner are filled up with -1, those that ended with it."""
     games = [paper_like(8, 4, 30, seed) for seed in range(4)]
     board, generator = layout(*games), torch.Generator().manual_seed(3)
@@ -99,13 +99,13 @@ def test_games_side_by_side_grant_what_each_grants_alone() -> None:
         assert together[number].tolist() == alone + [-1] * (together.shape[1] - len(alone))
 
 
-def test_nobody_can_bid(board: Board) -> None:
+def test_game_ends_without_open_bids(board: Board) -> None:
     """Where no bid is open the game ends, whatever the reserve: no barred bid is ever granted."""
     bids = torch.full(board.shape, -torch.inf)
     assert grant_bids(board, reset(board), bids, torch.tensor([-torch.inf])).tolist() == [[9]]
 
 
-def test_bids_are_not_written_over(board: Board) -> None:
+def test_bids_are_not_modified(board: Board) -> None:
     """Granting leaves the bids as they were."""
     bids = torch.arange(9.0).view(1, 3, 3)
     before = bids.clone()
@@ -113,7 +113,7 @@ def test_bids_are_not_written_over(board: Board) -> None:
     assert torch.equal(bids, before)
 
 
-def test_many_may_become_idle_at_once() -> None:
+def test_several_agents_may_become_idle_at_once() -> None:
     """Idleness is no task: any number of agents of different tasks go there in one step."""
     board = layout(Instance(ability=[1, 1, 1], workload=[1, 1, 1], start_task=[0, 1, 2]))
     bids = torch.full(board.shape, -torch.inf)
@@ -124,7 +124,7 @@ def test_many_may_become_idle_at_once() -> None:
     assert after.group.tolist() == [[0, 0, 0, 3]]
 
 
-def test_one_move_at_a_time(board: Board) -> None:
+def test_most_moves_limits_the_granted_bids(board: Board) -> None:
     """With `most_moves` 1 the best bid alone is granted, and the reserve is listed only where it is the best."""
     bids = torch.full(board.shape, -torch.inf)
     bids[0, 2, 1], bids[0, 0, 2] = 2.0, 1.0
@@ -132,14 +132,14 @@ def test_one_move_at_a_time(board: Board) -> None:
     assert grant_bids(board, reset(board), bids, torch.tensor([3.0]), 1).tolist() == [[9]]
 
 
-def test_sums_by_place_by_hand() -> None:
+def test_sums_by_place_match_hand_calculation() -> None:
     """Two games of three agents with two figures each: who is at a place adds up there, and nobody is 0."""
     values = torch.tensor([[[1.0, 10.0], [2.0, 20.0], [4.0, 40.0]], [[1.0, 0.5], [1.0, 0.5], [1.0, 0.5]]])
     sums = sum_by_place(values, torch.tensor([[0, 2, 0], [1, 1, 1]]), 3)
     assert sums.tolist() == [[[5.0, 50.0], [0.0, 0.0], [2.0, 20.0]], [[0.0, 0.0], [3.0, 1.5], [0.0, 0.0]]]
 
 
-def test_step_moves_ability(board: Board) -> None:
+def test_step_updates_group_abilities(board: Board) -> None:
     """A move takes the agent's ability from one task to the other, and nothing else changes."""
     state = reset(board)
     assert state.group.tolist() == [[2.0, 1.0, 0.0]]
@@ -149,7 +149,7 @@ def test_step_moves_ability(board: Board) -> None:
     assert not after.done.any()
 
 
-def test_a_game_in_which_nobody_moves_ends(board: Board) -> None:
+def test_game_without_moves_ends(board: Board) -> None:
     """After it has ended, nothing changes any more and nothing is open."""
     ended = go(board, reset(board), *board.start[0].tolist())
     assert ended.done.all()
@@ -157,7 +157,7 @@ def test_a_game_in_which_nobody_moves_ends(board: Board) -> None:
     assert current_tasks(board, go(board, ended, 2, 2, 2)).tolist() == [[0, 1, 0]]
 
 
-def test_open_bids_by_hand(board: Board) -> None:
+def test_open_bids_match_hand_calculation(board: Board) -> None:
     """Agents may go to what is in reach, but where they are; also to being idle."""
     assert action_mask(board, reset(board))[0].tolist() == [
         [False, False, True],
@@ -166,7 +166,7 @@ def test_open_bids_by_hand(board: Board) -> None:
     ]
 
 
-def test_no_return(board: Board) -> None:
+def test_agents_do_not_return_to_a_place(board: Board) -> None:
     """Nobody returns to a place that it left, being idle included, unless the rules let it."""
     there = go(board, reset(board), 2, 1, 1)
     back = go(board, there, 2, 1, 2)
@@ -175,7 +175,7 @@ def test_no_return(board: Board) -> None:
     assert free[0].tolist() == [[True, False, False], [True, False, True], [True, True, False]]
 
 
-def test_planning_pays_for_the_last_place(board: Board) -> None:
+def test_only_the_final_task_costs_energy(board: Board) -> None:
     """Going away and back costs nothing: energy is that of the final task, flown directly (19)."""
     start = reset(board)
     there = go(board, start, 0, 1, 1)
@@ -184,7 +184,7 @@ def test_planning_pays_for_the_last_place(board: Board) -> None:
     assert mean_distance(board, go(board, there, 0, 1, 0)).item() == mean_distance(board, start).item()
 
 
-def test_flying_by_hand(route: Instance) -> None:
+def test_hops_match_hand_calculation(route: Instance) -> None:
     """Agents at 0 fly to 3, 7 and 0: hops of 3, 4 and 7; being idle takes no flight and no agent away."""
     board = layout(route)
     unit = board.scale.item()
@@ -204,7 +204,7 @@ def test_flying_by_hand(route: Instance) -> None:
     assert battery_left(board, rest).item() == pytest.approx((4 / 11 + 4 / 7) / 2)
 
 
-def test_the_battery_left_limits_the_reach(route: Instance) -> None:
+def test_remaining_battery_limits_reach(route: Instance) -> None:
     """After hops of 3 and 4, 4 of 11 are left: enough for 4 back to 3, not for 7 back to 0; 0 of 7 for none."""
     board = layout(route)
     state = go(board, go(board, reset(board), 1, 1), 2, 2)
@@ -214,14 +214,14 @@ def test_the_battery_left_limits_the_reach(route: Instance) -> None:
     assert action_mask(board, state, Rules(returning=True))[0].sum().item() == 6
 
 
-def test_agents_fly_to_where_they_begin(board: Board) -> None:
+def test_first_flight_counts(board: Board) -> None:
     """Who starts away from the task that it begins at pays for the way; else staying there were free."""
     state = reset(board)
     assert state.flown[0].tolist() == pytest.approx([0, 0.165, 0.33])
     assert state.location.tolist() == [[0, 1, 0]]
 
 
-def test_the_idle_stay_where_they_are() -> None:
+def test_idle_agents_stay_at_their_start() -> None:
     """Who begins idle, as nothing is in its range, is at its start; from there distances are its own."""
     board = layout(Instance(ability=[1, 1], workload=[1], task_position=[[3, 0]], agent_position=[[0, 0], [3, 0]],
                             communication_range=[1, 1]))  # fmt: skip
@@ -231,7 +231,7 @@ def test_the_idle_stay_where_they_are() -> None:
     assert battery_left(board, state).item() == 1
 
 
-def test_battery_left_is_that_of_agents_with_a_battery(route: Instance) -> None:
+def test_remaining_battery_ignores_unlimited_agents(route: Instance) -> None:
     """Agents without a battery do not count."""
     board = layout(Instance(ability=[1, 1], workload=[1, 1], task_position=[[0, 0], [1, 0]], start_task=[0, 0],
                             battery=[2, np.inf]))  # fmt: skip
@@ -239,7 +239,7 @@ def test_battery_left_is_that_of_agents_with_a_battery(route: Instance) -> None:
 
 
 @given(instances(), st.integers(0, 99))
-def test_hops_are_no_shorter_than_the_direct_flight(instance: Instance, seed: int) -> None:
+def test_hops_are_never_shorter_than_the_direct_flight(instance: Instance, seed: int) -> None:
     """An episode never costs less than its plan, where all places are known; and no battery is overdrawn."""
     board = layout(instance)
     last = played(board, PAPER, seed)[-1]

@@ -4,14 +4,14 @@ import pytest
 from alloc.problems import InputError, machine_covering
 
 
-def test_same_seed_same_instance():
+def test_same_seed_gives_same_instance():
     """The same seed gives the same instance, another one another instance."""
     first, again, other = (machine_covering(12, 4, 1, 100, seed) for seed in (3, 3, 4))
     assert np.array_equal(first.ability, again.ability)
     assert not np.array_equal(first.ability, other.ability)
 
 
-def test_abilities_and_workloads_lie_in_their_ranges():
+def test_abilities_and_workloads_are_in_their_ranges():
     """Abilities are integers in the given range, workloads are all 1000, or integers from 200 to 2000."""
     equal, unequal = (machine_covering(400, 100, 20, 50, 0, equal=equal) for equal in (True, False))
     assert np.array_equal(equal.ability, unequal.ability)
@@ -23,7 +23,7 @@ def test_abilities_and_workloads_lie_in_their_ranges():
     assert np.array_equal(unequal.workload, np.round(unequal.workload))
 
 
-def test_real_abilities():
+def test_real_abilities_are_rarely_integers():
     """Real abilities are rarely integers."""
     ability = machine_covering(50, 20, 1, 100, 0, whole=False).ability
     assert (ability != np.round(ability)).all()

@@ -22,7 +22,7 @@ SIZES = {1: (100, 20, 400), 2: (300, 30, 1200), 3: (500, 30, 2400), 4: (500, 50,
 
 
 @pytest.mark.parametrize("scenario", SIZES)
-def test_the_papers_scenarios(scenario: int) -> None:
+def test_paper_scenarios_have_their_sizes_and_totals(scenario: int) -> None:
     """Sizes and totals are the paper's, abilities whole numbers from 1 to 10, workloads distinct and positive."""
     n, m, total = SIZES[scenario]
     for seed in range(20):
@@ -37,7 +37,7 @@ def test_the_papers_scenarios(scenario: int) -> None:
 
 
 @pytest.mark.parametrize("scenario", SIZES)
-def test_what_the_paper_leaves_open(scenario: int) -> None:
+def test_defaults_of_paper_scenarios(scenario: int) -> None:
     """Unit cube, every agent at some task, 6 units of energy per distance, batteries of 20 and 30, tau 0.5."""
     instance = paper(scenario, 7)
     assert instance.name == f"paper-{scenario}-seed-7"
@@ -58,7 +58,7 @@ def test_large_abilities_occur() -> None:
     assert counts[1] == counts.max()
 
 
-def test_seeds() -> None:
+def test_same_seed_gives_same_instance() -> None:
     """The same seed gives the same instance, another one another."""
     for make in (lambda seed: paper(2, seed), lambda seed: random_instance(Family(), seed)):
         assert to_document(make(3)) == to_document(make(3))
@@ -67,7 +67,7 @@ def test_seeds() -> None:
 
 @settings(max_examples=50, deadline=None)
 @given(st.data())
-def test_paper_like_of_any_size(data: st.DataObject) -> None:
+def test_paper_like_instances_of_any_size(data: st.DataObject) -> None:
     """Instances are found for all feasible totals, including extreme ones."""
     n = data.draw(st.integers(1, 60))
     total = data.draw(st.integers(n, 10 * n))
@@ -83,7 +83,7 @@ def test_paper_like_of_any_size(data: st.DataObject) -> None:
 @pytest.mark.parametrize("ability", ["equal", "uniform", "lognormal", "pareto"])
 @pytest.mark.parametrize("workload", ["equal", "uniform", "lognormal", "pareto", "dirichlet"])
 @pytest.mark.parametrize("integer", [True, False])
-def test_the_load_is_met(ability: str, workload: str, integer: bool) -> None:
+def test_load_is_met(ability: str, workload: str, integer: bool) -> None:
     """Total workload over total ability is the load asked for, whatever the distributions."""
     family = Family(agents=200, tasks=30, ability=ability, workload=workload, integer=integer, load=0.8)
     instance = random_instance(family, 5)
@@ -96,7 +96,7 @@ def test_the_load_is_met(ability: str, workload: str, integer: bool) -> None:
         assert np.ptp(instance.workload) <= 1
 
 
-def test_ability_limits() -> None:
+def test_ability_distributions_respect_their_limits() -> None:
     """Uniform abilities fill their range, lognormal ones sometimes exceed it, Pareto ones have no upper limit."""
     limits: dict[str, Any] = {"agents": 5000, "integer": False, "ability_min": 2, "ability_max": 8}
     uniform = random_instance(Family(**limits), 1).ability
@@ -113,7 +113,7 @@ def test_ability_limits() -> None:
 @pytest.mark.parametrize("dimensions", [2, 3])
 @pytest.mark.parametrize("sites", ["uniform", "clustered"])
 @pytest.mark.parametrize("starts", ["tasks", "own", "depots", "unknown"])
-def test_places(dimensions: int, sites: str, starts: str) -> None:
+def test_positions_are_in_the_world(dimensions: int, sites: str, starts: str) -> None:
     """Sites and starts are in the world, with the given dimensions, depots or tasks."""
     family = Family(dimensions=dimensions, sites=sites, starts=starts, world_size=50, depots=3)
     instance = random_instance(family, 2)
@@ -185,7 +185,7 @@ WRONG: list[tuple[dict[str, Any], str]] = [
 
 
 @pytest.mark.parametrize(("fields", "place"), WRONG)
-def test_families_that_make_no_sense(fields: dict[str, Any], place: str) -> None:
+def test_parameters_out_of_range_are_refused(fields: dict[str, Any], place: str) -> None:
     """Parameters out of their range are errors that name them."""
     with pytest.raises(InputError) as caught:
         Family(**fields)
@@ -208,7 +208,7 @@ def test_families_that_make_no_sense(fields: dict[str, Any], place: str) -> None
         (lambda: paper_like(0, 5, 14, 0), "agents"),
     ],
 )
-def test_what_cannot_be_generated(make: Any, place: str) -> None:
+def test_invalid_scenarios_seeds_and_totals_are_refused(make: Any, place: str) -> None:
     """Invalid scenarios, seeds and totals are errors that name the parameter."""
     with pytest.raises(InputError) as caught:
         make()

@@ -31,13 +31,13 @@ def can_all_be_served(instance: Instance, tasks: tuple[int, ...]) -> bool:
 
 
 @given(instances(most_agents=4, most_tasks=3))
-def test_fewest_unserved_is_that_of_brute_force(instance: Instance) -> None:
+def test_fewest_unserved_matches_brute_force(instance: Instance) -> None:
     """The number by matching equals that by brute force."""
     assert fewest_unserved(instance) == brute_force(instance).unserved
 
 
 @given(allocated())
-def test_serve_all(case: tuple[Instance, Allocation]) -> None:
+def test_serve_all_leaves_fewest_tasks_unserved(case: tuple[Instance, Allocation]) -> None:
     """Afterwards the fewest tasks are unserved, served ones stay served, and all rules hold."""
     instance, allocation = case
     served_before = np.flatnonzero(evaluate(instance, allocation).group_ability > 0)
@@ -49,7 +49,7 @@ def test_serve_all(case: tuple[Instance, Allocation]) -> None:
 
 
 @given(allocated())
-def test_serve_all_leaves_complete_plans_alone(case: tuple[Instance, Allocation]) -> None:
+def test_serve_all_is_idempotent(case: tuple[Instance, Allocation]) -> None:
     """Doing it twice is doing it once."""
     instance, allocation = case
     once = serve_all(instance, allocation)
@@ -58,7 +58,7 @@ def test_serve_all_leaves_complete_plans_alone(case: tuple[Instance, Allocation]
 
 
 @given(instances())
-def test_the_unservable_set_is_inclusion_minimal(instance: Instance) -> None:
+def test_unservable_set_is_inclusion_minimal(instance: Instance) -> None:
     """The set cannot be served, but every proper subset can, and one agent too few can take any of its tasks."""
     tasks = minimal_unservable_set(instance)
     needed = tuple(np.flatnonzero(instance.workload > 0).tolist())
@@ -71,7 +71,7 @@ def test_the_unservable_set_is_inclusion_minimal(instance: Instance) -> None:
         assert reachable(instance)[1][:, rivals].any(axis=1).sum() == len(rivals) - 1
 
 
-def test_contested_by_hand(contested: Instance) -> None:
+def test_contested_tasks_match_hand_calculation(contested: Instance) -> None:
     """Three tasks share two agents; the fourth has its own."""
     tasks = minimal_unservable_set(contested)
     assert tasks is not None
@@ -79,7 +79,7 @@ def test_contested_by_hand(contested: Instance) -> None:
     assert fewest_unserved(contested) == 1
 
 
-def test_augmenting_path_by_hand() -> None:
+def test_augmenting_path_matches_hand_calculation() -> None:
     """Task 2 needs agent 0, which must leave task 0 to agent 1, which must leave task 1 to the idle agent 2."""
     instance = Instance(ability=[1, 1, 1], workload=[1, 1, 1], allowed_tasks=[[0, 2], [0, 1], [1]])
     assert serve_all(instance, Allocation([0, 1, -1])) == Allocation([2, 0, 1])
@@ -97,7 +97,7 @@ def test_idle_agents_are_taken_first() -> None:
 
 
 @pytest.mark.parametrize("agents", [1, 2, 5])
-def test_without_limits_the_count_decides(agents: int) -> None:
+def test_unlimited_agents_serve_as_many_tasks(agents: int) -> None:
     """If all agents can take all tasks, n agents serve n tasks."""
     instance = Instance(ability=np.ones(agents), workload=[1, 0, 1, 1])
     assert fewest_unserved(instance) == max(0, 3 - agents)
@@ -105,7 +105,7 @@ def test_without_limits_the_count_decides(agents: int) -> None:
 
 
 @pytest.mark.parametrize(("agents", "tasks", "lists"), [(40, 60, 2), (60, 60, 2), (55, 60, 3), (1000, 2000, 50)])
-def test_failed_searches_mislead_no_later_one(agents: int, tasks: int, lists: int) -> None:
+def test_failed_searches_do_not_affect_later_ones(agents: int, tasks: int, lists: int) -> None:
     """All servable tasks are served, and thousands of failed searches are cheap."""
     rng = np.random.default_rng(agents)
     for _ in range(5):

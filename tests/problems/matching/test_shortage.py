@@ -10,7 +10,7 @@ from alloc.problems import Allocation, Instance, evaluate, find_shortage
 
 
 @given(instances(most_agents=4, most_tasks=5))
-def test_shortage_is_that_of_brute_force(instance: Instance) -> None:
+def test_shortage_matches_brute_force(instance: Instance) -> None:
     """There is a shortage if tasks stay unserved; its bound is valid, and the optimum if nothing else is left."""
     best, shortage = brute_force(instance), find_shortage(instance)
     assert (shortage is None) == (best.unserved == 0)
@@ -29,7 +29,7 @@ def test_shortage_is_that_of_brute_force(instance: Instance) -> None:
             )
 
 
-def test_by_hand() -> None:
+def test_plan_matches_hand_calculation() -> None:
     """Agent 0 leaves the easiest task to agent 1, which would take ten hours for the other that it can do."""
     instance = Instance(
         ability=[100, 1, 1], workload=[1, 10, 11, 5], allowed_tasks=[[0, 2], [0, 1], [3]]
@@ -41,7 +41,7 @@ def test_by_hand() -> None:
     assert shortage.part_of(Allocation([2, 0, 3])) == Allocation([0])
 
 
-def test_no_time_still_serves_as_many_as_can_be() -> None:
+def test_zero_time_still_gives_a_maximum_matching() -> None:
     """Without time the matching is not improved, but is still valid."""
     rng = np.random.default_rng(1)
     lists = [rng.permutation(60)[:8].tolist() for _ in range(20)]

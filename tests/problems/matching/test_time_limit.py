@@ -31,7 +31,7 @@ def surplus_of_tasks(reach: float | None, agents: int = 2_000, tasks: int = 20_0
 
 @pytest.mark.parametrize("reach", [0.1, 0.5])
 @pytest.mark.parametrize("method", ["greedy", "local-search"])
-def test_the_limit_holds_and_every_agent_serves_a_small_task(reach: float, method: str) -> None:
+def test_time_limit_is_respected_and_agents_serve_small_tasks(reach: float, method: str) -> None:
     """Each of 2,000 agents serves one of 20,000 tasks after 1.6 s of processor time at most, and not the largest."""
     solve(surplus_of_tasks(reach, 20, 200), method, time_limit_s=0.1)  # loads what is compiled
     instance = surplus_of_tasks(reach)
@@ -45,7 +45,7 @@ def test_the_limit_holds_and_every_agent_serves_a_small_task(reach: float, metho
     assert any("only 2000 agents can take any of the 2001 tasks" in note for note in result.notes)
 
 
-def test_without_time_the_note_says_what_is_not_proven() -> None:
+def test_zero_time_gives_a_note() -> None:
     """Without time some tasks are served, and a note says that more might be possible."""
     instance = surplus_of_tasks(0.02)
     result = solve(instance, "greedy", time_limit_s=0)
@@ -55,7 +55,7 @@ def test_without_time_the_note_says_what_is_not_proven() -> None:
 
 
 @given(st.integers(0, 10**6))
-def test_agents_in_excess_here_and_tasks_there(seed: int) -> None:
+def test_distant_surpluses_of_agents_and_tasks_are_matched(seed: int) -> None:
     """With idle agents in one place and unserved tasks in another, a run without a table serves the most tasks."""
     rng = np.random.default_rng(seed)
     instance = surplus_of_tasks(0.15, 30, 60)
@@ -105,7 +105,7 @@ def test_hopcroft_and_karp_agree_with_scipy(seed: int) -> None:
     assert all(found[i] in column[first[i] : first[i + 1]] for i in served)
 
 
-def test_a_sample_has_pairs_of_every_size() -> None:
+def test_samples_contain_pairs_of_every_size() -> None:
     """With small budgets each agent has small and large tasks; with large budgets, all pairs."""
     instance = surplus_of_tasks(0.5, 400, 5_000)
     agents, tasks = np.arange(400), np.arange(5_000)
@@ -125,7 +125,7 @@ def looks(number: int) -> Callable[[], float]:
 
 
 @pytest.mark.parametrize("number", [0, 1, 2, 5, 20])
-def test_a_matching_ends_with_its_time(number: int) -> None:
+def test_matching_ends_with_its_time(number: int) -> None:
     """When the clock runs out, a valid matching is returned that is not claimed to be maximum."""
     rng = np.random.default_rng(2)
     row, column = np.nonzero(rng.random((400, 400)) < 0.006)
@@ -138,7 +138,7 @@ def test_a_matching_ends_with_its_time(number: int) -> None:
     assert all(found[i] in column[first[i] : first[i + 1]] for i in served)
 
 
-def test_a_long_path_is_left_when_time_runs_out() -> None:
+def test_long_paths_respect_the_time_limit() -> None:
     """Computation of levels, and the search along a path through all rows, check the clock."""
     n = 1_000  # row i holds column i - 1 and can take column i besides; row 0 holds none
     first = np.concatenate([[0], 1 + 2 * np.arange(n)])
@@ -185,7 +185,7 @@ def test_no_proof_without_time(monkeypatch: pytest.MonkeyPatch) -> None:
     assert find_shortage(instance, lambda: 0.0) is None
 
 
-def test_clocks() -> None:
+def test_shares_and_minimums_of_time() -> None:
     """A share of the time ends before the time does, and a minimum time applies even without time left."""
     left = iter([10.0, 10.0, 6.0, 5.0])
     part = share_of(0.5, lambda: next(left))

@@ -21,7 +21,7 @@ from alloc.problems.vocabulary import MissionFamily
 
 
 @pytest.mark.parametrize("family", MissionFamily)
-def test_every_family_is_seeded(family):
+def test_every_family_is_reproducible(family):
     """The same seed gives the same mission, another seed another one."""
     parameters = MissionParameters(family=family)
     first = mission_to_document(random_mission(parameters, 1))
@@ -64,7 +64,7 @@ def test_sizes_of_paper_scenarios_are_fixed():
         random_mission(MissionParameters(family="paper-2", agents=3), 0)
 
 
-def test_a_snapshot_has_present_agents_and_open_tasks():
+def test_snapshot_has_present_agents_and_open_tasks():
     """A snapshot has the agents that have joined and not failed, and the open tasks with their grown work."""
     instance = Instance(ability=[1, 2, 3], workload=[4, 5, 6], battery=[1, 2, 3])
     mission = Mission(
@@ -82,7 +82,7 @@ def test_a_snapshot_has_present_agents_and_open_tasks():
     assert snapshot_at(Mission(instance, appears=[1, 1, 1]), 0.5) is None
 
 
-def test_measures_are_as_defined():
+def test_measures_match_hand_calculation():
     """Two tasks of priorities 1 and 3, done after 2 and 4 hours by one agent that flies 2 + 0, have known measures."""
     instance = Instance(
         ability=[1, 1], workload=[1, 2, 5, 9], priority=[1, 3, 2, 2], speed=[1, 1], battery=[8, 4],

@@ -66,7 +66,7 @@ def test_consequences_of_a_fault_are_not_reported():
     assert places(faulty(events__1__agent="a2")) == ["events[1]"]
 
 
-def test_the_first_fault_is_that_of_the_reader():
+def test_first_fault_matches_the_reader():
     """The first error is the one that reading the mission raises."""
     for document in (faulty(seed=0.5), faulty(tasks=[]), faulty(format="alloc-mission/2"), [], faulty(pace={"low": 9})):
         with pytest.raises(InputError) as caught:
@@ -74,7 +74,7 @@ def test_the_first_fault_is_that_of_the_reader():
         assert str(mission_faults(document)[1][0]) == str(caught.value)
 
 
-def test_fields_that_occur_twice():
+def test_repeated_fields_are_faults():
     """A repeated field in an object is a fault, and later faults are still found."""
     text = (
         json.dumps(GOOD)
@@ -84,7 +84,7 @@ def test_fields_that_occur_twice():
     assert places(json_text.parse(text)) == ["agents[0]", "tasks[0].workload"]
 
 
-def test_a_good_mission_is_returned():
+def test_valid_mission_is_returned():
     """Without faults, the mission is the one that the reader returns."""
     drawn = mission_to_document(random_mission(MissionParameters(family="failures"), 3))
     mission, faults = mission_faults(drawn)
@@ -92,7 +92,7 @@ def test_a_good_mission_is_returned():
     assert mission_to_document(mission) == drawn
 
 
-def test_the_number_of_faults_is_limited():
+def test_number_of_reported_faults_is_limited():
     """Of very many faults only the first ones are reported, and the given document is not modified."""
     document = faulty(events=[{"hour": -1, "event": "agent-fails", "agent": "a1"}] * 50)
     before = copy.deepcopy(document)

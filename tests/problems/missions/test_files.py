@@ -28,7 +28,7 @@ DEMO = {
 }  # fmt: skip
 
 
-def test_the_example_is_read():
+def test_example_is_read():
     """Agents and tasks defined in events are among the others, and the timeline is chronological."""
     mission = mission_from_document(DEMO)
     assert mission.instance.agent_ids == ("a1", "a2")
@@ -42,14 +42,14 @@ def test_the_example_is_read():
 
 @given(missions())
 @settings(max_examples=30, deadline=None)
-def test_missions_survive_writing_and_reading(mission):
+def test_missions_survive_a_round_trip(mission):
     """A written mission is valid by the schema, and is read as an equal mission."""
     document = json.loads(json.dumps(mission_to_document(mission)))
     assert faults(document) == []
     assert mission_to_document(mission_from_document(document)) == mission_to_document(mission)
 
 
-def test_an_instance_is_a_mission(tmp_path):
+def test_instance_is_read_as_a_mission(tmp_path):
     """An instance file in any format is read as a mission with all agents and tasks from the start."""
     from alloc.problems import paper, write_instance
 
@@ -117,7 +117,7 @@ def test_sequences_of_events_must_be_possible():
             mission_from_document(DEMO | {"events": events})
 
 
-def test_returns_with_own_distances_is_refused():
+def test_returns_with_given_distances_are_refused():
     """Agents that return are refused with own distances: an agent stopped on the way has no distance home."""
     document = DEMO | {"distances": {"rows": [["a1", "t1", 2]]}, "agents": [DEMO["agents"][0] | {"returns": True}]}
     with pytest.raises(InputError, match=r"agents\[0\]\.returns: cannot be combined"):
@@ -133,7 +133,7 @@ def logged(seed):
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_a_log_is_replayed_byte_for_byte(seed, tmp_path):
+def test_log_is_replayed_byte_for_byte(seed, tmp_path):
     """The file alone reproduces the same lines and the same figures, and the conservation laws hold."""
     log = logged(seed)
     write_log(log, tmp_path / "log.jsonl")
@@ -146,7 +146,7 @@ def test_a_log_is_replayed_byte_for_byte(seed, tmp_path):
     assert laws.battery_lost == pytest.approx(laws.battery_energy, rel=1e-9, abs=1e-9)
 
 
-def test_a_changed_log_is_an_error_at_its_line(tmp_path):
+def test_changed_log_is_an_error_at_its_line(tmp_path):
     """A changed hour, a changed order, a missing line and a changed figure are each an error."""
     lines = logged(2).to_text().splitlines()
     order = next(number for number, line in enumerate(lines) if '"record": "arrival"' in line)

@@ -40,7 +40,7 @@ def known(simulation, agent):
     return set(simulation.view(agent).tasks)
 
 
-def test_agents_know_what_they_sense():
+def test_agents_know_only_what_they_sense():
     """Without radio, an agent knows itself and what was within its sensing radius when it sensed."""
     simulation = told(mission(Radio(radius=0.2)), 0.5)
     assert [known(simulation, name) for name in ("a1", "a2", "a3")] == [{"t1"}, set(), set()]
@@ -49,7 +49,7 @@ def test_agents_know_what_they_sense():
         simulation.view("a1").tasks["t9"] = None
 
 
-def test_news_travels_by_one_radius_a_period():
+def test_news_travels_one_hop_per_period():
     """What one agent sees, the second hears at once and the third a period later, with the hour of observation."""
     radio = Radio(radius=1.0, period=0.5)
     first, later = told(mission(radio), 0.0), told(mission(radio), 0.5)
@@ -59,7 +59,7 @@ def test_news_travels_by_one_radius_a_period():
     assert later.view("a3").tasks["t1"].hour == 0.0
 
 
-def test_messages_take_their_delay():
+def test_messages_are_delayed():
     """With a delay of 0.7 h, nothing is known by radio before."""
     radio = Radio(radius=1.0, period=0.5, delay=0.7)
     assert known(told(mission(radio), 0.5), "a2") == set()
@@ -96,7 +96,7 @@ def test_bursts_have_their_lengths_and_losses():
     assert lost[1:][lost[:-1]].mean() > 0.9
 
 
-def test_full_knowledge_is_of_the_present():
+def test_full_knowledge_excludes_the_future():
     """With full knowledge, agents know all tasks that have appeared and agents that have joined, but not the future."""
     simulation = Simulation(Mission(LINE, joins=[0, 0, 5], appears=[0, 3]))
     simulation.advance()

@@ -55,7 +55,7 @@ def file(tmp_path):
     return write
 
 
-def test_calls_are_tasks_at_their_hour(file):
+def test_calls_become_tasks(file):
     """Places in km, hours since the first call, pump hours or 1; calls without a place are left out and reported."""
     told = []
     mission = import_mission("london", file(CALLS), RecordOptions(agents=3, compress=2), report=told.append)
@@ -69,7 +69,7 @@ def test_calls_are_tasks_at_their_hour(file):
     assert mission_to_document(mission_from_document(mission_to_document(mission))) == mission_to_document(mission)
 
 
-def test_days_can_be_chosen(file):
+def test_days_can_be_selected(file):
     """Hours count from the start of the first selected day; the last day is included."""
     wanted = RecordOptions(first=date(2020, 2, 2), last=date(2020, 2, 3))
     mission = import_mission("london", file(CALLS), wanted)
@@ -78,7 +78,7 @@ def test_days_can_be_chosen(file):
         import_mission("london", file(CALLS), RecordOptions(first=date(2021, 1, 1)))
 
 
-def test_the_fleet_names_the_agents(file):
+def test_agents_are_read_from_the_fleet(file):
     """Pumping appliances in service are the agents, up to the requested number."""
     fleet = file(
         "Fleet No,Operational Status,Type of Vehicle\n"
@@ -92,7 +92,7 @@ def test_the_fleet_names_the_agents(file):
         import_mission("london", file(CALLS), RecordOptions(fleet=fleet, agents=3))
 
 
-def test_fires_are_tasks_at_their_day(file):
+def test_fires_become_tasks(file):
     """Places in units of 0.403716 km, days by date or by number, sizes of at least 0.1 ha."""
     mission = import_mission("new-brunswick", file(FIRES), RecordOptions(agents=2, ability=0.5, speed=80))
     assert mission.appears.tolist() == [0, 24]
@@ -104,7 +104,7 @@ def test_fires_are_tasks_at_their_day(file):
     )
 
 
-def test_printed_cfstp(file):
+def test_printed_cfstp_is_read(file):
     """Tasks are in the order of their numbers, distances Manhattan, and coalitions work at a pace of 1 to 2."""
     mission = import_mission("cfstp", file(PRINTED))
     assert mission.instance.task_position[:, :2].tolist() == [[3, 12], [9, 2]]
@@ -113,7 +113,7 @@ def test_printed_cfstp(file):
     assert mission.instance.agent_position[:, :2].tolist() == [[5, 10]]
 
 
-def test_space_configurations(file):
+def test_space_configurations_are_read(file):
     """Places and workloads are within bounds, later tasks come in waves, and a radius of 0 means unlimited."""
     mission = import_mission("space", file(CONFIG, "c.yaml"), seed=4)
     instance = mission.instance
@@ -163,7 +163,7 @@ def test_faults_name_file_and_place(file, kind, text, told):
     assert told in str(caught.value)
 
 
-def test_wrong_options(file):
+def test_wrong_options_are_refused(file):
     """Options that a format does not take or that are out of range are errors that name them."""
     for options, kind, told in (
         (RecordOptions(), "space", "options: are for records, not for space"),

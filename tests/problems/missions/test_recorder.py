@@ -12,7 +12,7 @@ from alloc.problems.missions.simulation.state import AgentStatus, TaskStatus
 
 
 @pytest.mark.parametrize("family", ["failures", "recharging", "growth", "deadlines", "silence"])
-def test_a_course_agrees_with_the_simulation(family: str) -> None:
+def test_course_agrees_with_the_simulation(family: str) -> None:
     """Legs have no gaps and add up to the distance flown, and tasks end as in the result."""
     mission = random_mission(MissionParameters(family=family, agents=4, tasks=6, loss=0.2), seed=3)
     run = simulate(mission, "greedy")

@@ -33,7 +33,7 @@ def run(mission, orders, **options):
 
 @given(missions(), st.integers(0, 100))
 @settings(max_examples=40, deadline=None)
-def test_nothing_is_lost(mission, seed):
+def test_work_and_energy_are_conserved(mission, seed):
     """Under random orders, all work and energy is accounted for at every event and at the end."""
     state = run_wildly(mission, seed).state
     conservation.check(state)
@@ -64,7 +64,7 @@ def test_inconsistent_ledgers_are_detected():
 
 @given(instances(speeds=True), st.randoms(use_true_random=False))
 @settings(max_examples=40, deadline=None)
-def test_a_mission_without_events_scores_as_its_instance(instance, random):
+def test_mission_without_events_matches_the_evaluator(instance, random):
     """With full knowledge and one task per agent, completion times and energy are those of `evaluate`."""
     allows = instance.reach.mask[instance.reach.origin]
     task = [random.choice([-1, *np.flatnonzero(row).tolist()]) for row in allows]
@@ -100,7 +100,7 @@ def test_agents_are_diverted_in_flight(metric):
     assert simulation.state.switches == 1
 
 
-def test_with_own_distances_agents_are_diverted_at_the_end_of_a_flight():
+def test_agents_with_given_distances_are_diverted_at_the_end_of_a_flight():
     """With own distances, an agent in flight first completes that flight, and goes on from there without working."""
     distances = [("a1", "t1", 2), ("t1", "t2", 3), ("a1", "t2", 9)]
     instance = Instance(ability=[1], workload=[5, 4], speed=[1], distances=distances)
@@ -142,7 +142,7 @@ def test_growth_ends_when_an_agent_works():
     assert state.tasks[0].closed == 9.0  # 8 of work at 2 per hour from hour 3, without hours 5 to 7
 
 
-def test_coalitions_change_while_they_work():
+def test_coalitions_can_change_during_work():
     """An agent that arrives later helps from then on; one that fails no longer does."""
     instance = Instance(
         ability=[1, 2], workload=[10], agent_position=[[0, 0], [2, 0]], task_position=[[0, 0]], speed=[1, 1]
@@ -162,7 +162,7 @@ def test_completions_come_before_deadlines_and_events_of_the_hour():
     assert (state.tasks[0].status, state.tasks[0].missed, state.tasks[0].done) == (TaskStatus.MISSED, 2.0, 4.0)
 
 
-def test_events_of_one_hour_happen_in_the_order_of_the_file():
+def test_simultaneous_events_follow_the_order_of_the_file():
     """Of two changes of the work left at the same hour, the later one in the file counts."""
     for amounts, total in (((9, 3), 3.0), ((3, 9), 9.0)):
         events = [Event(1, "task-changes", task="t1", workload=amount) for amount in amounts]
@@ -172,7 +172,7 @@ def test_events_of_one_hour_happen_in_the_order_of_the_file():
         assert simulation.state.tasks[0].left == total
 
 
-def test_pace_changes_from_period_to_period():
+def test_pace_changes_between_periods():
     """A group works by the factor of each hour, which does not depend on earlier events."""
     mission = Mission(ONE, pace=Pace(0.5, 1.5, 1.0), seed=3)
     task = run(mission, {0: {"a1": Order("t1")}}).state.tasks[0]
@@ -181,7 +181,7 @@ def test_pace_changes_from_period_to_period():
     assert 2 * np.dot(hours, factors) == pytest.approx(6.0, rel=1e-9)
 
 
-def test_a_recharged_agent_can_go_on():
+def test_recharged_agent_can_continue():
     """An agent without energy can take the task once it is recharged."""
     instance = Instance(
         ability=[1], workload=[1], agent_position=[[0, 0]], task_position=[[4, 0]], speed=[1], battery=[1]
@@ -218,7 +218,7 @@ def test_agents_return_to_their_base_if_they_have_flown():
     assert simulation.order("a2", Order("t2")) is None
 
 
-def test_the_same_seed_gives_the_same_course():
+def test_same_seed_gives_the_same_course():
     """Two runs of the same mission under the same orders have the same records."""
     mission = random_mission_of_any_kind(np.random.default_rng(5))
     assert run_wildly(mission, 1).log.records == run_wildly(mission, 1).log.records

@@ -5,7 +5,7 @@ from alloc.problems.models.names import LONGEST, plain_names
 
 
 @given(st.lists(st.text(alphabet="ab_ é1", min_size=1, max_size=6), unique=True, max_size=20))
-def test_names_are_unique_and_plain(ids: list[str]) -> None:
+def test_names_are_unique_and_valid(ids: list[str]) -> None:
     """Names are unique and have no double underscore; an id that is a valid name is kept."""
     names = plain_names(ids, "agent")
     assert len(set(names)) == len(ids)
@@ -15,7 +15,7 @@ def test_names_are_unique_and_plain(ids: list[str]) -> None:
         assert (own == name) or not is_plain
 
 
-def test_long_ids_are_cut() -> None:
+def test_long_ids_are_shortened() -> None:
     """Long ids with equal beginnings have short and different names."""
     names = plain_names(["a" * 300, "a" * 301, "a" * 40], "agent")
     assert names[2] == "a" * LONGEST

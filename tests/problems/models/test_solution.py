@@ -61,7 +61,7 @@ SOLVERS = {"highs": HIGHS, "highs-pretty": HIGHS_PRETTY, "cbc": CBC, "gurobi": G
 
 
 @pytest.mark.parametrize("solver", SOLVERS)
-def test_counts_of_every_solver_are_spread(tmp_path: Path, solver: str) -> None:
+def test_class_counts_of_every_solver_are_assigned(tmp_path: Path, solver: str) -> None:
     """Counts of a class are assigned to its agents, for files of all solvers and any names."""
     path = tmp_path / "answer.txt"
     path.write_text(SOLVERS[solver].format(value="0.9999999"))
@@ -69,7 +69,7 @@ def test_counts_of_every_solver_are_spread(tmp_path: Path, solver: str) -> None:
 
 
 @pytest.mark.parametrize("solver", SOLVERS)
-def test_fractions_are_told(tmp_path: Path, solver: str) -> None:
+def test_fractional_solutions_are_refused(tmp_path: Path, solver: str) -> None:
     """Fractional values are refused as the solution of a relaxation."""
     path = tmp_path / "answer.sol"
     path.write_text(SOLVERS[solver].format(value="0.5"))
@@ -102,7 +102,7 @@ def test_fractions_are_told(tmp_path: Path, solver: str) -> None:
         ("# Objective value = 1\nx_a1__t 1\nn_a3__t 1\n", "mixes variables of several models: n, x"),
     ],
 )
-def test_broken_solutions_are_one_line(tmp_path: Path, text: str, message: str) -> None:
+def test_invalid_solutions_are_one_line(tmp_path: Path, text: str, message: str) -> None:
     """Files that are not a solution of a model of this instance are refused with the line."""
     path = tmp_path / "answer.sol"
     path.write_text(text)
@@ -112,7 +112,7 @@ def test_broken_solutions_are_one_line(tmp_path: Path, text: str, message: str) 
     assert str(caught.value).count("\n") == 0
 
 
-def test_no_agent_at_work_is_a_solution(tmp_path: Path) -> None:
+def test_solution_with_all_agents_idle_is_read(tmp_path: Path) -> None:
     """As SCIP leaves zeros out, a file may contain only y, and all agents are idle."""
     path = tmp_path / "answer.sol"
     path.write_text("solution status: optimal solution found\ny 1e-9 (obj:1)\n")

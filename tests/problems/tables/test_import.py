@@ -69,14 +69,14 @@ def test_workbooks_are_imported_or_refused(case: Case, tmp_path: Path) -> None:
     check(case, tmp_path)
 
 
-def test_there_are_spreadsheets_enough() -> None:
+def test_there_are_enough_spreadsheets() -> None:
     """There are at least sixty spreadsheets, all different."""
     names = [case.name for case in [*TEXTS, *WORKBOOKS]]
     assert len(set(names)) == len(names) >= 60
 
 
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "utf-16-le", "utf-16-be", "latin-1", "cp1252"])
-def test_all_spellings_of_a_table_are_the_same(encoding: str, tmp_path: Path) -> None:
+def test_separators_and_encodings_do_not_matter(encoding: str, tmp_path: Path) -> None:
     """The same fleet is read with any separator, encoding, decimal mark and line ends."""
     for separator in (";", "\t", ",", "|"):
         for mark in (",", "."):
@@ -98,7 +98,7 @@ ROWS = [{"Site": 1, "Load": "3,5", "needs": "B"}, {"Site": 2, "Load": 4}]
 
 
 @pytest.mark.needs("pandas")
-def test_data_frames_dicts_and_lists_of_dicts_are_tables() -> None:
+def test_data_frames_dicts_and_lists_of_dicts_are_accepted() -> None:
     """The same columns in either form give the same instance; an index with a name is a column."""
     import pandas as pd
 
@@ -114,7 +114,7 @@ def test_data_frames_dicts_and_lists_of_dicts_are_tables() -> None:
         assert instance.needs == (("b",), ())
 
 
-def test_distances_are_dicts_too() -> None:
+def test_distances_can_be_dicts() -> None:
     """Distances from Python, as rows and as a matrix."""
     agents, tasks = {"id": ["a"], "ability": [1]}, {"id": ["s", "t"], "workload": [1, 2]}
     rows = Instance.from_tables(agents, tasks, [{"from": "a", "to": "s", "distance": 3}])
@@ -133,7 +133,7 @@ def test_distances_are_dicts_too() -> None:
         ({"id": ["a", "b"], "ability": [1, -1]}, "agents: row 1: must be a finite number > 0, got -1 (agent 'b')"),
     ],
 )
-def test_what_is_no_table_is_refused(agents: object, line: str) -> None:
+def test_invalid_python_tables_are_refused(agents: object, line: str) -> None:
     """Errors for data from Python name the argument, the row and the column."""
     with pytest.raises(InputError) as raised:
         Instance.from_tables(agents, {"workload": [1]})
@@ -150,7 +150,7 @@ def refusal(read: Callable[[], Grid]) -> str:
 
 
 @given(st.binary(max_size=60), st.sampled_from(["", "id,ability\n", "id;ability;x;y\n1;2;"]))
-def test_no_bytes_are_a_defect(tmp_path_factory: pytest.TempPathFactory, data: bytes, start: str) -> None:
+def test_arbitrary_bytes_never_crash(tmp_path_factory: pytest.TempPathFactory, data: bytes, start: str) -> None:
     """Any bytes give an instance or a one-line error."""
     path = tmp_path_factory.getbasetemp() / "agents.csv"
     path.write_bytes(start.encode() + data)
@@ -165,14 +165,14 @@ HEADINGS = ["id", "ability", "Payload", "x", "y", "lat", "lon", "GPS", "Location
     st.lists(st.sampled_from(HEADINGS), min_size=1, max_size=5),
     st.lists(st.lists(st.sampled_from(CELLS), max_size=6), max_size=4),
 )
-def test_no_cells_are_a_defect(header: list[str], rows: list[list[str]]) -> None:
+def test_arbitrary_cells_never_crash(header: list[str], rows: list[list[str]]) -> None:
     """Any cells under known headers give an instance or a one-line error."""
     grid = Grid("agents.csv", [list(header), *[[cell or None for cell in row] for row in rows]], [*"01234"])
     assert refusal(lambda: grid).isprintable()
 
 
 @pytest.mark.needs("openpyxl")
-def test_sheets_are_named_or_the_first(tmp_path: Path) -> None:
+def test_sheet_is_selected_by_name_or_the_first(tmp_path: Path) -> None:
     """An unknown sheet is refused with the nearest one; the same table for agents and tasks is refused."""
     path = tmp_path / "fleet.xlsx"
     path.write_bytes(workbook([["id", "ability"], ["a", 1]], sheet="Drones"))
@@ -184,7 +184,7 @@ def test_sheets_are_named_or_the_first(tmp_path: Path) -> None:
 
 
 @pytest.mark.needs("openpyxl")
-def test_hidden_rows_are_told(tmp_path: Path) -> None:
+def test_hidden_rows_are_reported(tmp_path: Path) -> None:
     """Rows hidden by a filter are read, with a note; files that are not workbooks are refused."""
     from openpyxl import load_workbook
 

@@ -40,7 +40,7 @@ class DrawnTask:
 
 @pytest.mark.parametrize("kind", ["whole", "limited", "real"])
 @pytest.mark.parametrize("seed", range(12))
-def test_cheapest_group_with_cuts_is_that_of_all_groups_written_out(seed, kind):
+def test_cheapest_group_with_cuts_matches_enumeration(seed, kind):
     """With classes of up to two agents and random cuts, no group is cheaper, and the reported cost is right."""
     task = DrawnTask(seed, kind)
     group = np.zeros(7, dtype=np.int64)
@@ -71,7 +71,7 @@ def test_enumeration_finds_all_groups_within_a_limit(seed, kind):
     assert found == len({tuple(one) for one in written}) > 0
 
 
-def test_a_cut_closes_the_gap_of_three_agents_for_two_tasks():
+def test_cut_closes_the_gap_of_three_agents_for_two_tasks():
     """If any two of three agents suffice for a task, fractional agents suffice for both tasks, integer ones for one."""
     use = np.array([[1, 0, 1], [1, 1, 0], [0, 1, 1], [0, 0, 0]])
     sets, excess = violated_sets(use, np.array([0.5, 0.5, 0.5]), np.array([1, 1, 1, 0]), 0.05, 10)
@@ -147,7 +147,7 @@ def knapsack_of(rng: np.random.Generator, limited: bool) -> EnergyModel:
 
 @pytest.mark.parametrize("limited", [False, True])
 @pytest.mark.parametrize("seed", range(15))
-def test_a_cluster_is_cut_unless_its_mixture_is_one_of_integer_solutions(seed, limited):
+def test_cluster_is_cut_unless_its_mixture_is_a_convex_combination_of_integer_solutions(seed, limited):
     """A linear programme over all enumerated solutions gives the largest violation of a cut."""
     rng = np.random.default_rng(seed)
     model, both = knapsack_of(rng, limited), np.ones((1, 2), dtype=bool)
@@ -225,7 +225,7 @@ def test_expensive_groups_are_left_out_until_they_are_added_again():
     assert np.isfinite(master._cost[:8]).all()
 
 
-def test_bound_with_cuts_is_the_least_cost_and_the_mixture_a_plan():
+def test_bound_with_cuts_reaches_the_least_cost_with_an_integer_mixture():
     """Two agents for one task and the expensive one for the other cost 5, mixtures 4.5."""
     model, groups = three_for_two()
     cuts = CuttingPlanes(model, np.zeros((0, 2), dtype=bool), np.zeros(4), groups)

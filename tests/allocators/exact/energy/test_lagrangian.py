@@ -56,7 +56,7 @@ def model_of(seed: int, tasks: int, *, limited: bool) -> tuple[EnergyModel, floa
 @pytest.mark.parametrize("worse", [1.0001, 1.3])
 @pytest.mark.parametrize("limited", [False, True])
 @pytest.mark.parametrize("seed", range(4))
-def test_bound_is_below_the_best_plan_and_its_pairs_are_kept(seed, limited, worse, monkeypatch):
+def test_bound_never_exceeds_the_optimum_and_keeps_its_pairs(seed, limited, worse, monkeypatch):
     """However long prices aim at the cost of a worse plan, the bound is below the best plan, which loses no pair."""
     monkeypatch.setattr(lagrangian, "is_small", lambda model: False)  # small models have no prices of clusters
     model, best, plan = model_of(seed, 4, limited=limited)
@@ -89,7 +89,7 @@ def test_excess_is_a_lower_bound_on_the_extra_cost_of_a_pair(seed, limited):
 @pytest.mark.parametrize("worse", [1.0, 1.2])
 @pytest.mark.parametrize("kind", ["whole", "limited", "real"])
 @pytest.mark.parametrize("seed", range(8))
-def test_bound_by_cutting_planes_is_below_the_best_plan(seed, kind, worse):
+def test_bound_by_cutting_planes_never_exceeds_the_optimum(seed, kind, worse):
     """Until no cut is violated any more, the bound is below the best plan, which loses no pair."""
     model, best, plan = model_of(seed, 4, limited=kind == "limited")
     if kind == "real":
@@ -109,7 +109,7 @@ def test_bound_by_cutting_planes_is_below_the_best_plan(seed, kind, worse):
 @pytest.mark.parametrize("worse", [1.0, 1.2])
 @pytest.mark.parametrize("limited", [False, True])
 @pytest.mark.parametrize("seed", range(6))
-def test_the_best_of_all_groups_is_the_best_plan(seed, limited, worse):
+def test_best_plan_over_enumerated_groups_is_optimal(seed, limited, worse):
     """The groups of all plans cheaper than a given one contain the best plan, and none cheaper."""
     model, best, plan = model_of(seed, 4, limited=limited)
     group = (model.task_of_pair == plan[model.class_of_pair]).astype(np.int64)
@@ -134,7 +134,7 @@ def has_float_weights(instance):
 
 @pytest.mark.parametrize("slack", [1.0, 1.2])
 @pytest.mark.parametrize("seed", seeds_where(has_float_weights, 30))
-def test_bound_in_floats_is_below_the_least_energy(seed, slack):
+def test_bound_in_floats_never_exceeds_the_least_energy(seed, slack):
     """With speeds and real-valued abilities, brute force finds no plan in time that costs less than the bound."""
     instance = tiny_instance(seed)
     best = brute_force(instance)

@@ -43,7 +43,7 @@ def with_mixture(state: EnergyState, table) -> EnergyState:
     return replace(state, primal_dual=Sides(mixed))
 
 
-def test_agents_on_whom_plan_and_mixture_agree_stay():
+def test_agents_with_equal_task_in_plan_and_mixture_are_fixed():
     """The pairs of the plan are always in; of other classes, so are those that the mixture has."""
     agent_class, plan = np.array([0, 0, 1, 1, 1, 2, 2]), np.array([1, 0, 1, 0, 0, 2, 0])
     mixed = np.array([0.95, 0.05, 0.3, 0.69, 0.01, 1.5, 0.5])
@@ -59,7 +59,7 @@ def test_agents_on_whom_plan_and_mixture_agree_stay():
         ([[1, 0], [0, 1], [0.5, 0.5], [0.5, 0.5]], 0.2 + 2 * np.hypot(1, 0.2)),
     ],
 )
-def test_the_best_plan_of_the_neighbourhood_is_found(mixture, cost):
+def test_best_plan_of_the_neighbourhood_is_found(mixture, cost):
     """Of the two agents that the mixture leaves open, each goes where both cost less; the two others stay."""
     state = with_mixture(crossed(), mixture)
     assert state.cost > cost + 0.05
@@ -67,7 +67,7 @@ def test_the_best_plan_of_the_neighbourhood_is_found(mixture, cost):
     assert state.cost == pytest.approx(cost)
 
 
-def test_neighbourhoods_grow_and_are_searched_less_often_without_a_better_plan():
+def test_neighbourhoods_grow_and_pauses_lengthen_without_improvement():
     """A better plan makes pauses short again."""
     state, induced = with_mixture(crossed(), np.eye(2)[[0, 1, 0, 1]]), InducedSearch()
     assert not induced.is_due(state)

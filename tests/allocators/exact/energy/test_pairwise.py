@@ -31,7 +31,7 @@ def test_repartition_of_a_pair_is_optimal(seed, partner):
     assert (np.bincount(task, weight, 3) >= need).all()
 
 
-def test_search_keeps_needs_and_never_loses_its_best_plan():
+def test_search_meets_all_needs_and_never_loses_its_best_plan():
     """Descent and annealing yield plans that do every task, with a best distance that never increases."""
     rng = np.random.default_rng(0)
     weight, task = rng.integers(1, 9, 30), np.arange(30) % 6
@@ -58,7 +58,7 @@ def search_of(seed: int) -> tuple[PairwiseSearch, np.ndarray, np.ndarray]:
     return PairwiseSearch(task, weight, distance, need, 1 - np.eye(6), seed), distance, task
 
 
-def test_search_sends_agents_only_where_they_are_allowed():
+def test_search_assigns_agents_only_to_allowed_tasks():
     """Or where they already are, which may be far from the best."""
     search, _, task = search_of(2)
     allowed = np.random.default_rng(0).random((30, 6)) < 0.4
@@ -70,7 +70,7 @@ def test_search_sends_agents_only_where_they_are_allowed():
     assert allowed[moved, search.best[moved]].all()
 
 
-def test_search_goes_on_from_a_better_plan_that_meets_all_needs():
+def test_search_adopts_better_feasible_plans():
     """Another search's plan is adopted, even on pairs not allowed here; one that leaves a task undone is not."""
     (search, _, task), (other, *_) = search_of(2), search_of(2)
     search.restrict(np.zeros((30, 6), dtype=bool))

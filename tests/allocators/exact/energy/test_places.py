@@ -8,7 +8,7 @@ from alloc.allocators.exact.model import Model
 from alloc.problems import IDLE, Allocation, Instance, agent_classes, evaluate
 
 
-def test_identical_agents_are_exchanged():
+def test_identical_agents_swap_tasks_to_save_distance():
     """Two agents of the same ability that were sent past each other each take the near task instead."""
     instance = Instance(
         ability=[1, 1], workload=[1, 1], agent_position=[[0, 0], [1, 0]], task_position=[[0, 0], [1, 0]]
@@ -16,14 +16,14 @@ def test_identical_agents_are_exchanged():
     assert nearest_places(instance, Allocation([1, 0])) == Allocation([0, 1])
 
 
-def test_an_idle_agent_that_is_nearer_takes_over():
+def test_nearer_idle_agent_takes_over():
     """Idle agents of the class take part in the exchange."""
     instance = Instance(ability=[1, 1], workload=[1], agent_position=[[5, 0], [1, 0]], task_position=[[0, 0]])
     assert nearest_places(instance, Allocation([0, IDLE])) == Allocation([IDLE, 0])
 
 
 @pytest.mark.parametrize("seed", range(30))
-def test_changing_places_keeps_the_makespan(seed):
+def test_exchange_keeps_the_makespan(seed):
     """Whatever the plan, no completion time changes, no rule is broken and no more energy is used."""
     instance = tiny_instance(seed)
     plan = Allocation(brute_force(instance).plan)

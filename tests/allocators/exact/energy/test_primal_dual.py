@@ -39,7 +39,7 @@ def at_home(agents: int, tasks: int, seed: int) -> tuple[Instance, Allocation]:
 
 
 @pytest.mark.parametrize("seed", seeds_where(all_can_be_served, 30))
-def test_bound_is_below_the_optimum_of_brute_force(seed):
+def test_bound_never_exceeds_the_optimum_of_brute_force(seed):
     """On tiny instances of every kind, the bound is valid, and plans have the reported cost."""
     instance = tiny_instance(seed)
     best = brute_force(instance)
@@ -51,7 +51,7 @@ def test_bound_is_below_the_optimum_of_brute_force(seed):
 
 
 @pytest.mark.parametrize("slack", [1.0, 1.3])
-def test_bound_and_plan_meet_or_come_close(slack):
+def test_gap_is_closed_to_a_few_percent(slack):
     """On an instance like the paper's, for T >= 1, the gap is closed to some percent."""
     instance, plan = at_home(40, 8, 1)
     sides = primal_dual(instance, plan, slack)
@@ -76,7 +76,7 @@ def test_pairs_of_the_best_plan_are_kept():
     assert len(sides.keep) < 0.5 * len(demand.class_of_pair)
 
 
-def test_same_seed_same_plans():
+def test_same_seed_gives_same_plans():
     """With effort counted in rounds, plans and bounds are reproducible."""
     instance = paper_like(60, 10, 240, 0)
     plan = Allocation(np.arange(60) % 10)
@@ -90,7 +90,7 @@ def test_same_seed_same_plans():
     assert ends[0] == ends[1]
 
 
-def test_limits_of_reach_are_kept():
+def test_reach_is_respected():
     """Agents are assigned only to tasks that they can take."""
     rng = np.random.default_rng(3)
     places = rng.random((6, 2))

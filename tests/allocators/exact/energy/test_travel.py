@@ -20,7 +20,7 @@ def objective(value, weight, tasks, option):
 
 
 @pytest.mark.parametrize("seed", range(40))
-def test_a_repartition_is_the_best_of_all(seed):
+def test_repartition_is_optimal(seed):
     """Of all ways to share some agents among tasks, the search finds one that costs the least."""
     rng = np.random.default_rng(seed)
     agents, count = int(rng.integers(1, 7)), int(rng.integers(1, 4))
@@ -39,7 +39,7 @@ def test_a_repartition_is_the_best_of_all(seed):
         assert objective(value, weight, tasks, best) == pytest.approx(least)
 
 
-def test_plans_of_the_search_do_all_work_and_cost_what_is_said():
+def test_search_plans_are_feasible_with_the_reported_cost():
     """The best plan leaves no task short, has agents only within reach, and costs less than the first one."""
     rng = np.random.default_rng(5)
     agents, tasks = 40, 6

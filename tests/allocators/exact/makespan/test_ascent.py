@@ -23,7 +23,7 @@ def ascent_on(instance: Instance, price: np.ndarray | None = None) -> tuple[Conf
 
 
 @pytest.mark.parametrize("seed", SERVED)
-def test_bound_holds_at_any_prices(seed):
+def test_bound_is_valid_for_any_prices(seed):
     """From any initial prices, after any number of rounds, no makespan from the optimum on is excluded."""
     instance, rng = tiny_instance(seed), np.random.default_rng(seed)
     best = brute_force(instance).makespan
@@ -50,7 +50,7 @@ def test_integrality_raises_the_bound():
     assert 3.97 < ascent.proven < 4.0
 
 
-def test_tasks_that_are_tiny_for_an_agent():
+def test_tasks_far_smaller_than_an_agents_work():
     """An agent's work may be any multiple of a task's need: it is capped before it is rounded to steps."""
     instance = Instance(ability=[2.8, 3.4, 10.0], workload=[1e-60, 0.0, 1e-9], speed=[np.inf, np.inf, 3.0])
     assert solve(instance, "cpsat", iterations=2, time_limit_s=None).makespan > 0

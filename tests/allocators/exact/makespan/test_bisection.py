@@ -75,7 +75,7 @@ def test_probes_without_verdict_prove_nothing(seed):
     assert search.lower_bound == state.lower == before
 
 
-def test_probe_gives_the_solvers_verdict():
+def test_probe_returns_the_verdict_of_the_solver():
     """Above the optimum there is a plan, below it a proof; for a T below the bound, the solver is not called."""
     instance = instance_of(0)
     search, solver = search_on(instance), ScriptedSolver(instance)
@@ -92,7 +92,7 @@ def test_probe_gives_the_solvers_verdict():
 
 @pytest.mark.parametrize("patience", [1.0, np.inf])
 @pytest.mark.parametrize("is_whole", [False, True])
-def test_patience_is_limited_if_abilities_have_no_unit(monkeypatch, is_whole, patience):
+def test_stage_is_limited_if_abilities_have_no_unit(monkeypatch, is_whole, patience):
     """The stage ends after as long again as the fastest plan took; with a unit, a proof may come at any time."""
     drawn = instance_of(0)
     instance = Instance(ability=np.round(drawn.ability), workload=drawn.workload) if is_whole else drawn

@@ -36,7 +36,7 @@ def test_no_feasible_makespan_is_excluded(seed):
             assert configurations.largest_infeasible(prices, time, 2 * best.makespan) < best.makespan * (1 + 1e-9)
 
 
-def test_needs_have_the_types_for_which_loops_are_compiled():
+def test_arrays_have_the_compiled_types():
     """Weights are contiguous; a column of a table would cause a recompilation within a run."""
     instance = Instance(ability=[3, 5, 6, 7], workload=[10, 14], allowed_tasks=[None, None, [0], [1]])
     needs = ConfigurationProgramme(model_of(instance), 1.0).needs(1.0)
@@ -44,7 +44,7 @@ def test_needs_have_the_types_for_which_loops_are_compiled():
     assert all(each.weight.flags.c_contiguous for each in needs)
 
 
-def test_theta_is_that_of_all_groups():
+def test_theta_matches_the_programme_over_all_groups():
     """Column generation ends at the optimum of the programme over all enumerated groups."""
     instance = Instance(ability=[3, 5, 6, 7, 9, 11], workload=[10, 14, 17])
     model = model_of(instance)
@@ -71,7 +71,7 @@ def test_theta_is_that_of_all_groups():
         assert prices.theta > 1
 
 
-def test_closes_what_simple_bounds_leave():
+def test_raises_the_simple_bound():
     """With 2.5 agents per task, the bound of (40, 16) U[1,100], seed 1, rises by 2.2 %."""
     instance = machine_covering(40, 16, 1, 100, 1)
     low = makespan_lower_bound(instance)
@@ -82,7 +82,7 @@ def test_closes_what_simple_bounds_leave():
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_real_abilities_are_rounded_to_the_safe_side(seed):
+def test_real_abilities_are_rounded_conservatively(seed):
     """On a grid, weights are not rounded down, and needs are not rounded up."""
     instance = machine_covering(30, 10, 1, 100, seed, equal=False, whole=False)
     model = model_of(instance)

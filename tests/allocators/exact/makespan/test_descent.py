@@ -44,7 +44,7 @@ def test_classes_and_reach_are_respected(seed):
     assert found.any(axis=0)[counts.any(axis=0)].all()
 
 
-def test_shortage_never_grows():
+def test_shortfall_never_grows():
     """If the target makespan is infeasible, the shortfall is at most that of the start."""
     rng = np.random.default_rng(3)
     instance = Instance(ability=rng.uniform(1, 9, 9), workload=rng.uniform(5, 20, 4))

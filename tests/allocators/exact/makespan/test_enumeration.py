@@ -48,7 +48,7 @@ def test_gives_up_if_there_are_too_many():
 
 @pytest.mark.parametrize("equal", [True, False])
 @pytest.mark.parametrize("seed", range(6))
-def test_choice_is_a_plan_or_there_is_none(seed, equal):
+def test_choice_is_feasible_or_infeasibility_is_proven(seed, equal):
     """At the optimum of brute force a plan is chosen; just below it, infeasibility is proven."""
     instance = machine_covering(8, 3, 1, 30, seed, equal=equal)
     best = brute_force(instance).makespan

@@ -24,7 +24,7 @@ def bound_of(instance: Instance, high: float) -> float:
 
 
 @pytest.mark.parametrize("seed", SERVED)
-def test_the_bound_is_valid_for_any_answer_of_the_solver(seed):
+def test_bound_is_valid_for_any_answer_of_the_solver(seed):
     """Neither right nor wrong answers lead to a bound above the optimum."""
     instance, rng = tiny_instance(seed), np.random.default_rng(seed)
     best = brute_force(instance).makespan
@@ -38,7 +38,7 @@ def test_the_bound_is_valid_for_any_answer_of_the_solver(seed):
         assert bound_of(instance, 2 * best) <= best * (1 + 1e-9)
 
 
-def test_by_hand():
+def test_bound_matches_hand_calculation():
     """Three agents of ability 1 share 9 hours of work, for which a fourth is of no use: the bound is 3 hours."""
     instance = Instance(ability=[1, 1, 1, np.pi], workload=[4, 5, 3], allowed_tasks=[*[[0, 1]] * 3, [2]])
     assert bound_of(instance, 4.0) == pytest.approx(3.0, rel=1e-4)

@@ -36,7 +36,7 @@ def test_partition_is_optimal(tasks, seed):
     assert shortfall(value, base, need, goal) == best
 
 
-def test_nothing_within_the_limit():
+def test_no_partition_within_the_limit():
     """If the shortfall of every partition exceeds the limit, none is chosen."""
     value, sums = np.ones((MAX_TASKS, MAX_POOL)), np.empty((MAX_TASKS + 1, 1 << MAX_POOL))
     chosen = np.full(MAX_TASKS, -1)

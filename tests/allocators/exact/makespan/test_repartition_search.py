@@ -14,7 +14,7 @@ def some_can_be_served(instance: Instance) -> bool:
 
 
 @pytest.mark.parametrize("seed", seeds_where(some_can_be_served, 30))
-def test_optimum_of_tiny_instances(seed):
+def test_optimum_of_tiny_instances_is_found(seed):
     """On tiny instances of every kind, the optimum is found; tasks that can be served are."""
     instance = tiny_instance(seed)
     best = brute_force(instance)
@@ -42,7 +42,7 @@ def test_found_plans_have_the_target_makespan():
     assert evaluate(instance, plan).makespan <= time * (1 + 1e-9)
 
 
-def test_same_seed_same_plan():
+def test_same_seed_gives_same_plan():
     """Random numbers depend only on the seed."""
     instance = machine_covering(30, 10, 100, 800, 1)
     plans = []

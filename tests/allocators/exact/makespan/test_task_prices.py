@@ -18,7 +18,7 @@ def bound_of(instance: Instance, high: float) -> float:
 
 
 @pytest.mark.parametrize("seed", seeds_where(all_can_be_served, 40))
-def test_no_prices_exclude_the_optimum(seed):
+def test_bound_never_exceeds_the_optimum(seed):
     """On tiny instances of every kind, the bound is at most the optimum of brute force."""
     instance = tiny_instance(seed)
     if instance.workload.any() and instance.reach.neighbours is not None:
@@ -26,7 +26,7 @@ def test_no_prices_exclude_the_optimum(seed):
         assert makespan_lower_bound(instance) * (1 - 1e-12) <= bound_of(instance, 2 * best) <= best * (1 + 1e-9)
 
 
-def test_by_hand():
+def test_bound_matches_hand_calculation():
     """Three agents of ability 1 share 9 hours of work, for which a fourth is of no use: the bound is 3 hours."""
     instance = Instance(ability=[1, 1, 1, np.pi], workload=[4, 5, 3], allowed_tasks=[*[[0, 1]] * 3, [2]])
     assert bound_of(instance, 4.0) == pytest.approx(3.0, rel=1e-3)

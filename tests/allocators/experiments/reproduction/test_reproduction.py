@@ -68,12 +68,12 @@ def rows_of(job: Job) -> list[Learned]:
     ]
 
 
-def test_the_shipped_page_is_made_from_the_shipped_rows() -> None:
+def test_shipped_page_matches_the_shipped_rows() -> None:
     """docs/reproduction.md is, byte for byte, what the rows beside it give."""
     assert Folder(DOCS).text() == (DOCS / "reproduction.md").read_text("utf-8")
 
 
-def test_rows_come_back_and_torn_lines_do_not(tmp_path: Path) -> None:
+def test_rows_are_read_back_without_truncated_lines(tmp_path: Path) -> None:
     """What is appended is read again, infinite and missing figures too; a line cut short by a crash is left out."""
     path = tmp_path / "rows.csv"
     assert read(path, Learned) == []
@@ -87,7 +87,7 @@ def test_rows_come_back_and_torn_lines_do_not(tmp_path: Path) -> None:
         read(path, Solved)
 
 
-def test_only_what_is_missing_is_made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_only_missing_runs_are_made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """An interrupted reproduction keeps the runs that have ended, and goes on with the others."""
     stop, made = threading.Event(), []
 
@@ -108,7 +108,7 @@ def test_only_what_is_missing_is_made(tmp_path: Path, monkeypatch: pytest.Monkey
 
 
 @pytest.mark.parametrize("lost", [1, 2, 9, 60])
-def test_a_torn_run_is_made_again(tmp_path: Path, lost: int) -> None:
+def test_truncated_run_is_repeated(tmp_path: Path, lost: int) -> None:
     """A run cut short, within a line or at its end, is not read and is missing; what is appended then is whole."""
     place, jobs = Folder(tmp_path), [Job(0, "gappo"), Job(1, "gappo"), Job(2, "gappo")]
     place.data.mkdir()
@@ -127,7 +127,7 @@ def test_a_torn_run_is_made_again(tmp_path: Path, lost: int) -> None:
     assert len(place.learned) == 3 * len(expected(jobs[0]))
 
 
-def test_rows_that_do_not_fit_on_the_disk_are_an_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_partially_written_rows_are_an_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Where the system writes but a part of the rows, the run does not count as made."""
     write = os.write
     monkeypatch.setattr(os, "write", lambda handle, data: write(handle, data[:20]))
@@ -152,7 +152,7 @@ def test_figures_and_page_are_made_from_rows(tmp_path: Path) -> None:
     assert "some methods have only 1 here.**" in place.page.read_text("utf-8")
 
 
-def test_effects_by_hand() -> None:
+def test_effects_match_hand_calculation() -> None:
     """Differences are paired by run; runs without the figure are left out; rises alone are fluctuation."""
     rows = [*history("gappo", 0, 2.0, 1.1, 1.0), *history("ppo", 0, 2.0, 1.0, 1.1), *history("gappo", 1, 2.0, 1.5, 1.2)]
     one = effect(rows, "gappo", "ppo", final("makespan"))
@@ -166,7 +166,7 @@ def test_effects_by_hand() -> None:
     assert fluctuation(first) == 0
 
 
-def test_runs_without_the_figure_are_told() -> None:
+def test_runs_without_the_figure_are_reported() -> None:
     """Runs with an infinite makespan on one side are left out of means and differences, and said to be."""
     rows = [row for run in range(4) for row in history("gappo", run, 1.0)]
     rows += [row for run, last in enumerate((1.2, 1.2, 1.2, math.inf)) for row in history("ppo", run, last)]
@@ -213,7 +213,7 @@ def described(ours: float, theirs: float, left: float, runs: int) -> list[str]:
 DESCRIBED = (traditional, least_energy, battery, optimal, sizes)
 
 
-def test_descriptive_claims_want_eight_runs() -> None:
+def test_descriptive_claims_need_eight_runs() -> None:
     """Means and medians decide with eight runs and not with seven; a claim on every run is refuted by one run."""
     assert described(1.0, 1.2, 90.0, runs=8) == [HOLDS] * 5
     assert described(1.0, 1.2, 90.0, runs=7) == [TOO_FEW] * 5
@@ -222,14 +222,14 @@ def test_descriptive_claims_want_eight_runs() -> None:
     assert described(1.2, 1.0, 50.0, runs=0) == [TOO_FEW] * 5
 
 
-def test_infinite_makespans_count_on_both_sides() -> None:
+def test_infinite_makespans_count_for_either_method() -> None:
     """Whoever leaves tasks unserved is behind in the median, and its energy is not compared."""
     assert described(1.0, math.inf, 90.0, runs=8)[:2] == [HOLDS, TOO_FEW]
     assert described(1.0, math.nan, 90.0, runs=8)[:2] == [HOLDS, TOO_FEW]
     assert described(math.inf, 1.0, 90.0, runs=8)[:2] == [NOT, TOO_FEW]
 
 
-def test_what_is_proven_comes_from_the_rows() -> None:
+def test_proven_optima_are_derived_from_the_rows() -> None:
     """The page calls the bound the optimum where a plan of that length is known, and says for how many it is."""
     learned = [*history("gappo", 0, 2.0, 1.2, scenario=1), *history("gappo", 0, 2.0, 1.2, scenario=2)]
     bounded = [replace(row, lower_bound=1.1) for row in learned]
@@ -263,7 +263,7 @@ def test_makespans_are_in_hours_over_the_proven_bound() -> None:
         ({"ppo": 1.0, "gappo-single": 1.2}, 8, "No effect of the population is shown** (fewer than 9 runs"),
     ],
 )
-def test_the_population_is_judged_by_a_single_member(rivals: dict[str, float], runs: int, words: str) -> None:
+def test_population_is_compared_with_a_single_member(rivals: dict[str, float], runs: int, words: str) -> None:
     """Being ahead of PPO, which differs in more, says nothing about the population; it is told beside the finding."""
     rows = []
     for run in range(runs):
@@ -279,7 +279,7 @@ def test_the_population_is_judged_by_a_single_member(rivals: dict[str, float], r
     ("change", "runs", "verdict"),
     [(0.1, 12, "helps"), (-0.1, 12, "better without"), (0.0, 12, "no effect shown"), (0.1, 5, "too few runs")],
 )
-def test_a_part_is_judged_by_the_variant_without_it(change: float, runs: int, verdict: str) -> None:
+def test_component_is_compared_with_the_variant_without_it(change: float, runs: int, verdict: str) -> None:
     """Enough runs of a variant and the sign of their difference decide; variants without runs are not measured."""
     rows = [row for run in range(runs) for row in history("gappo", run, 1.2)]
     rows += [row for run in range(runs) for row in history("gappo-on-policy", run, 1.2 + change * (1 + 0.1 * run))]
@@ -290,7 +290,7 @@ def test_a_part_is_judged_by_the_variant_without_it(change: float, runs: int, ve
     assert sum(line.endswith("**not measured** |") for line in lines) == len(ABLATIONS) - 1
 
 
-def test_ablations_lack_one_part(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_ablations_lack_one_component(monkeypatch: pytest.MonkeyPatch) -> None:
     """Each variant learns, and differs from `gappo` in the part that it is named after and nothing else."""
     monkeypatch.setattr(learning, "DECISIONS", 4)
     whole = learning._untrained(VARIANTS["gappo"], 3)
@@ -327,7 +327,7 @@ LACKS: dict[str, set[str]] = {
 
 
 @pytest.mark.slow
-def test_every_method_makes_its_rows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_every_method_produces_its_rows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A short run of each method, learned and not, is judged at each point; a training is repeated to the same rows."""
     small = learning._judged([paper_like(8, 3, 24, 1)])
     monkeypatch.setattr(learning, "DECISIONS", 10)

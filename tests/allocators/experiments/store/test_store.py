@@ -52,7 +52,7 @@ def finish(store, run, ending=SOLVED):
     return store.finish(run, replace(ending, finished_at=time.time()))
 
 
-def test_a_run_comes_back_as_it_was_written(tmp_path):
+def test_run_is_read_back_unchanged(tmp_path):
     """Run, ending and trace are the same after the file is reopened."""
     with Store(tmp_path / "runs.db") as store:
         assert store.claim([KEYS[0]]).key == KEYS[0]
@@ -63,7 +63,7 @@ def test_a_run_comes_back_as_it_was_written(tmp_path):
         assert store.records().keys() == {KEYS[0]}
 
 
-def test_the_tables_have_the_fields_of_a_run_and_its_ending(tmp_path):
+def test_tables_have_all_fields_of_runs_and_outcomes(tmp_path):
     """Every field has its column, and every column its field."""
     Store(tmp_path / "runs.db").close()
     rows = sqlite3.connect(tmp_path / "runs.db").execute("PRAGMA table_info(runs)").fetchall()
@@ -82,7 +82,7 @@ def test_runs_are_claimed_once(tmp_path):
         assert one.claim(KEYS).key == KEYS[1]
 
 
-def test_nothing_is_left_to_claim_while_others_work_on_it(tmp_path):
+def test_runs_leased_by_others_cannot_be_claimed(tmp_path):
     """If all remaining runs are leased by others, there is no run to claim, and none has ended."""
     with Store(tmp_path / "runs.db") as one, Store(tmp_path / "runs.db") as other:
         one.claim(KEYS[:1])
@@ -90,7 +90,7 @@ def test_nothing_is_left_to_claim_while_others_work_on_it(tmp_path):
         assert (claim.key, claim.done) == (None, frozenset())
 
 
-def test_a_lease_ends_with_its_process(tmp_path):
+def test_lease_ends_with_its_process(tmp_path):
     """The run of a killed command can be claimed by others at once."""
     code = "import sys, time; from alloc.allocators.experiments.store.store import Store; s = Store(sys.argv[1]);"
     code += " print(s.claim([sys.argv[2]]).key, flush=True); time.sleep(60)"
@@ -108,7 +108,7 @@ def test_a_lease_ends_with_its_process(tmp_path):
         child.stdout.close()
 
 
-def test_a_lease_that_is_not_renewed_expires(tmp_path, monkeypatch):
+def test_lease_expires_unless_renewed(tmp_path, monkeypatch):
     """A process that cannot be observed, as on another machine, finally loses its run; its result is rejected."""
     with Store(tmp_path / "runs.db") as one, Store(tmp_path / "runs.db") as other:
         one.claim(KEYS[:2])
@@ -125,7 +125,7 @@ def test_a_lease_that_is_not_renewed_expires(tmp_path, monkeypatch):
         assert other.records(KEYS)[KEYS[0]].ending.makespan == 1.5
 
 
-def test_failures_are_run_again_once_where_asked(tmp_path):
+def test_failures_are_retried_once_on_request(tmp_path):
     """Failed runs are retried once on request; runs with a missing package are always retried."""
     with Store(tmp_path / "runs.db") as store:
         finish(store, RUNS[0], Ending(outcome=Outcome.FAILED))
@@ -141,7 +141,7 @@ def test_failures_are_run_again_once_where_asked(tmp_path):
 
 
 @pytest.mark.parametrize("field", [field.name for field in fields(Run)])
-def test_every_field_decides_a_run(field):
+def test_every_field_is_part_of_the_key(field):
     """Runs that differ in any field have different keys."""
     old = getattr(RUNS[0], field)
     other = replace(RUNS[0], **{field: 7 if old is None or isinstance(old, int | float) else old + "x"})
@@ -149,7 +149,7 @@ def test_every_field_decides_a_run(field):
     assert replace(other, **{field: old}).key == RUNS[0].key
 
 
-def test_instances_are_known_by_content():
+def test_instances_are_identified_by_content():
     """The key depends on every number of an instance, but not on its name."""
     one = Instance(name="one", ability=[1, 2], workload=[3])
     assert fingerprint(one) == fingerprint(replace(one, name="other"))
@@ -157,7 +157,7 @@ def test_instances_are_known_by_content():
     assert fingerprint(one) != fingerprint(replace(one, task_ids=["x"]))
 
 
-def test_a_store_of_an_earlier_version_keeps_its_runs(tmp_path):
+def test_store_of_an_earlier_version_keeps_its_runs(tmp_path):
     """Runs from before missions were supported are found under the same keys."""
     with sqlite3.connect(tmp_path / "runs.db") as old:
         old.executescript(MIGRATIONS[0] + f"; PRAGMA application_id = {APPLICATION}; PRAGMA user_version = 1;")
@@ -171,7 +171,7 @@ def test_a_store_of_an_earlier_version_keeps_its_runs(tmp_path):
         assert store.records(KEYS)[KEYS[0]].ending == replace(SOLVED, trace=())
 
 
-def test_missions_are_known_by_content():
+def test_missions_are_identified_by_content():
     """The key depends on the events of a mission, but not on its name."""
     one = random_mission(MissionParameters(agents=3, tasks=4), 1)
     renamed = Mission(replace(one.instance, name="other"), **_rest(one))
@@ -183,7 +183,7 @@ def _rest(mission):
     return {name: getattr(mission, name) for name in signature(Mission).parameters if name != "instance"}
 
 
-def test_policies_count_by_content(tmp_path):
+def test_policies_are_identified_by_content(tmp_path):
     """Policy files are compared by content, not by name; the order of parameters does not matter."""
     file = tmp_path / "p.safetensors"
     file.write_bytes(b"one")
@@ -193,7 +193,7 @@ def test_policies_count_by_content(tmp_path):
     assert canonical({"b": 1, "policy": str(file)}) != before
 
 
-def test_the_commit_is_that_of_this_package(tmp_path, monkeypatch):
+def test_commit_is_that_of_this_package(tmp_path, monkeypatch):
     """In a checkout of alloc it is 40 digits, with a plus after changes; elsewhere, or without git, it is empty."""
     revision.cache_clear()
     assert re.fullmatch(r"([0-9a-f]{40}\+?)?", revision())
@@ -203,12 +203,12 @@ def test_the_commit_is_that_of_this_package(tmp_path, monkeypatch):
     revision.cache_clear()
 
 
-def test_versions_name_this_package():
+def test_built_in_methods_have_the_package_version():
     """A built-in method has the version of this package."""
     assert versions("greedy").startswith("alloc ")
 
 
-def test_owners_are_gone_with_their_process():
+def test_owners_are_recognised_by_process_and_start_time():
     """This process is alive; one with its id but another start time is gone; on other machines it is unknown."""
     place, pid, started, token = this_process().split(" ")
     assert not is_gone(this_process())
@@ -216,7 +216,7 @@ def test_owners_are_gone_with_their_process():
     assert not is_gone(" ".join([f"{place}0", pid, f"{started}0", token]))
 
 
-def test_an_older_store_is_brought_up_to_date(tmp_path, monkeypatch):
+def test_older_store_is_migrated(tmp_path, monkeypatch):
     """A file of an earlier version keeps its runs and gets the new columns and tables."""
     with Store(tmp_path / "runs.db") as store:
         finish(store, RUNS[0])
@@ -228,7 +228,7 @@ def test_an_older_store_is_brought_up_to_date(tmp_path, monkeypatch):
     assert found.execute("PRAGMA user_version").fetchone() == (len(MIGRATIONS) + 1,)
 
 
-def test_two_commands_begin_a_store_at_once(tmp_path, monkeypatch):
+def test_two_commands_create_a_store_at_once(tmp_path, monkeypatch):
     """A file that another command initialises at the same time is recognised as a store."""
     monkeypatch.setattr(store_module, "BUSY_S", 0.05)
     connect, others = sqlite3.connect, []
@@ -251,7 +251,7 @@ def test_two_commands_begin_a_store_at_once(tmp_path, monkeypatch):
     assert others
 
 
-def test_a_store_from_before_plans_takes_them_from_now_on(tmp_path):
+def test_store_from_before_plans_accepts_plans(tmp_path):
     """A file from before plans and instances were kept has its runs, without a commit, and takes plans from now on."""
     with Store(tmp_path / "runs.db") as store:
         finish(store, RUNS[0])
@@ -289,7 +289,7 @@ def test_instances_and_plans_are_kept(tmp_path):
         unpacked(kept[:-3])
 
 
-def test_a_later_store_is_refused(tmp_path):
+def test_store_of_a_later_version_is_refused(tmp_path):
     """A file of a later version is refused in one line and not changed."""
     Store(tmp_path / "runs.db").close()
     sqlite3.connect(tmp_path / "runs.db").execute("PRAGMA user_version = 99")
@@ -297,7 +297,7 @@ def test_a_later_store_is_refused(tmp_path):
         Store(tmp_path / "runs.db")
 
 
-def test_other_files_are_no_stores(tmp_path):
+def test_other_files_are_refused(tmp_path):
     """A text file, and a database of another program, are refused in one line and not changed."""
     (tmp_path / "text").write_text("instance,method\n" * 100)
     with pytest.raises(InputError, match="is not a store of runs"):
@@ -314,7 +314,7 @@ def test_other_files_are_no_stores(tmp_path):
         Store(tmp_path)
 
 
-def test_a_damaged_store_is_told(tmp_path):
+def test_damaged_store_is_reported(tmp_path):
     """A file with overwritten pages is reported as damaged, in one line."""
     with Store(tmp_path / "runs.db") as store:
         finish(store, RUNS[0])
@@ -325,7 +325,7 @@ def test_a_damaged_store_is_told(tmp_path):
         store.claim(KEYS)
 
 
-def test_a_locked_store_is_told(tmp_path, monkeypatch):
+def test_locked_store_is_reported(tmp_path, monkeypatch):
     """A lock of another program is reported after a while; the contents of the store are kept."""
     monkeypatch.setattr(store_module, "BUSY_S", 0.05)
     with Store(tmp_path / "runs.db") as store:
@@ -339,7 +339,7 @@ def test_a_locked_store_is_told(tmp_path, monkeypatch):
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root writes to anything")
-def test_a_read_only_store_is_told(tmp_path):
+def test_read_only_store_is_reported(tmp_path):
     """A write-protected file is reported in one line."""
     Store(tmp_path / "runs.db").close()
     (tmp_path / "runs.db").chmod(0o444)
@@ -359,7 +359,7 @@ def small_files():
 
 
 @pytest.mark.usefixtures("small_files")
-def test_a_full_disk_loses_nothing(tmp_path):
+def test_full_disk_loses_no_rows(tmp_path):
     """A full disk is reported in one line; earlier rows are kept, and no row is incomplete."""
     with Store(tmp_path / "runs.db") as store:
         finish(store, RUNS[0])

@@ -14,7 +14,7 @@ def series(instance: Instance, objective: Objective = Objective.MAKESPAN_ENERGY)
     return DeadlineSeries(Search(instance, objective, Budget(None)), AuctionParameters())
 
 
-def test_each_task_one_agent_is_bertsekas() -> None:
+def test_single_agent_tasks_reach_the_bound_of_bertsekas() -> None:
     """Where each task needs one of several equal agents, the distance exceeds the least by at most the increments."""
     for seed in range(20):
         rng = np.random.default_rng(seed)
@@ -34,7 +34,7 @@ def test_each_task_one_agent_is_bertsekas() -> None:
         assert cost[np.arange(m), task].sum() <= least + m * AuctionParameters().increment + 1e-9
 
 
-def test_met_deadlines_are_met() -> None:
+def test_reported_deadlines_are_met() -> None:
     """When an auction meets all demands, tasks are done by the deadline, and none has an agent that it can spare."""
     for seed in range(1000, 1003):
         instance = paper(1, seed)
@@ -47,14 +47,14 @@ def test_met_deadlines_are_met() -> None:
             assert spare[auction.market.owner[i]] < instance.ability[i]
 
 
-def test_impossible_deadlines_end() -> None:
+def test_auction_ends_at_impossible_deadlines() -> None:
     """An auction for a deadline that cannot be met ends, and says so."""
     assert not series(Instance(ability=[1, 1], workload=[4, 4])).meet(1.0)
     assert not series(Instance(ability=[1, 1], workload=[4, 4], allowed_tasks=[[0], [0]])).meet(4.0)
 
 
 @pytest.mark.slow
-def test_scenarios_are_solved() -> None:
+def test_paper_scenario_is_solved() -> None:
     """The paper's first scenario comes to within 2 %, with less energy where that counts, and messages counted."""
     plain = solve(paper(1, 1000), "auction", iterations=20_000, time_limit_s=None)
     saving = solve(paper(1, 1000), "auction", objective="makespan-energy", iterations=20_000, time_limit_s=None)
@@ -75,7 +75,7 @@ def test_slack_saves_energy() -> None:
     assert loose.energy < 0.95 * strict.energy
 
 
-def test_parameters_are_keywords() -> None:
+def test_parameters_are_set_by_keyword() -> None:
     """Parameters are set by keyword; wrong ones are named."""
     assert Auction(deadlines=2).parameters == AuctionParameters(deadlines=2)
     with pytest.raises(InputError) as caught:

@@ -29,7 +29,7 @@ def test_a_line_of_agents() -> None:
     assert communication_graph(instance, 0.5).n_components == 4
 
 
-def test_unlimited_or_unknown_is_complete() -> None:
+def test_graph_is_complete_without_ranges_or_locations() -> None:
     """Without ranges, or without locations, the graph is complete; one agent without a location connects all others."""
     far = [[0, 0], [9, 9], [99, 99]]
     assert communication_graph(Instance(ability=[1, 1, 1], workload=[1], agent_position=far)).is_complete
@@ -43,7 +43,7 @@ def test_unlimited_or_unknown_is_complete() -> None:
 
 
 @given(instances(most_agents=6))
-def test_graph_by_definition(instance: Instance) -> None:
+def test_graph_matches_the_definition(instance: Instance) -> None:
     """The graph is that of all pairs compared one by one, and components never cut an edge."""
     graph = communication_graph(instance)
     position, reach = instance.start_position, instance.communication_range

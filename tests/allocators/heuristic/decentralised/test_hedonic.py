@@ -36,7 +36,7 @@ def shortfall(instance: Instance, task_of_agent: np.ndarray) -> float:
 
 
 @given(instances(speeds=False))
-def test_ends_nash_and_exchange_stable(instance: Instance) -> None:
+def test_final_partition_is_nash_and_exchange_stable(instance: Instance) -> None:
     """At the end of a game no move of an agent, and no swap of two neighbours, reduces the shortfall."""
     assume((instance.workload > 0).any())
     graph = communication_graph(instance)
@@ -57,7 +57,7 @@ def test_ends_nash_and_exchange_stable(instance: Instance) -> None:
 
 
 @given(instances(speeds=False, most_agents=6))
-def test_components_agree(instance: Instance) -> None:
+def test_agents_of_a_component_agree_on_the_partition(instance: Instance) -> None:
     """At the end of a game, all agents of a component believe in the same partition, with the right coverages."""
     assume((instance.workload > 0).any())
     game = stable_game(instance, radius=1.0, objective=Objective.MAKESPAN_ENERGY)
@@ -73,7 +73,7 @@ def test_components_agree(instance: Instance) -> None:
         )
 
 
-def test_one_game_is_good() -> None:
+def test_one_game_comes_close_to_the_optimum() -> None:
     """On the paper's first scenario a single game comes within 3 % of the optimum, also on local communication."""
     for seed in range(1000, 1004):
         instance = paper(1, seed)
@@ -105,7 +105,7 @@ def test_messages_are_counted() -> None:
     assert "the communication graph has 2 components" in isolated.notes[1]
 
 
-def test_components_divide_all_tasks() -> None:
+def test_components_share_all_tasks() -> None:
     """Two components both give every task its share of their ability, so that all are served."""
     instance = Instance(
         ability=np.ones(40),
@@ -123,14 +123,14 @@ def test_too_many_agents_are_refused() -> None:
         solve(Instance(ability=np.ones(10_000), workload=[1, 1]), "hedonic")
 
 
-def test_start_where_there_is_nothing_to_do() -> None:
+def test_agents_starting_on_tasks_without_work_are_reassigned() -> None:
     """Agents that start on a task without workload are assigned to others."""
     instance = Instance(ability=[2, 1, 1], workload=[0, 2, 1])
     result = solve(instance, "hedonic", start=Allocation([0, 0, 1]), iterations=50, time_limit_s=None)
     assert result.makespan == pytest.approx(1.0)
 
 
-def test_parameters_are_keywords() -> None:
+def test_parameters_are_set_by_keyword() -> None:
     """Parameters are set by keyword, an unlimited radius included; wrong ones are named."""
     assert Hedonic(communication_radius=np.inf, partners=3).parameters == HedonicParameters(np.inf, partners=3)
     for name, value in (("communication_radius", -1), ("partners", 1.5), ("hearing", 1)):

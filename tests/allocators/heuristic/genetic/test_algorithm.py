@@ -54,7 +54,7 @@ def test_improves_on_greedy(evolved: Result) -> None:
 
 
 @pytest.mark.parametrize("objective", ["makespan", "makespan-energy"])
-def test_never_proposes_violations(objective: str) -> None:
+def test_never_submits_infeasible_plans(objective: str) -> None:
     """Everything that it submits respects lists of tasks."""
     told: list[Improvement] = []
     solve(hard(), "ga", objective=objective, time_limit_s=None, iterations=60, on_improvement=told.append)
@@ -78,14 +78,14 @@ def outcome(result: Result) -> tuple[object, ...]:
     return result.allocation, result.makespan, result.energy, len(result.trace)
 
 
-def test_same_seed_same_answer() -> None:
+def test_same_seed_gives_same_answer() -> None:
     """With an iteration budget a seed fixes the answer and the steps towards it; another seed takes other steps."""
     answers = [solve(hard(), "ga", time_limit_s=None, iterations=40, seed=seed) for seed in (1, 1, 2)]
     assert outcome(answers[0]) == outcome(answers[1])
     assert outcome(answers[0]) != outcome(answers[2])
 
 
-def test_leaves_global_random_alone() -> None:
+def test_global_generators_are_not_used() -> None:
     """Neither of the two global generators is drawn from or seeded."""
     before, numpy_before = random.getstate(), np.random.get_state()  # noqa: NPY002
     solve(hard(), "ga", time_limit_s=None, iterations=5)
@@ -93,7 +93,7 @@ def test_leaves_global_random_alone() -> None:
     assert np.array_equal(np.random.get_state()[1], numpy_before[1])  # noqa: NPY002
 
 
-def test_threads_share_one_allocator() -> None:
+def test_threads_can_share_an_allocator() -> None:
     """Runs in several threads on one object give what each gives alone."""
     allocator, alone = (
         load("ga"),
@@ -112,7 +112,7 @@ def test_threads_share_one_allocator() -> None:
     assert [together[0], together[1]] == alone
 
 
-def test_builds_on_a_start(evolved: Result) -> None:
+def test_warm_start_is_never_lost(evolved: Result) -> None:
     """The answer is never worse than the warm start, which is better than what one generation finds by itself."""
     good = evolved
     assert good.allocation is not None
@@ -124,12 +124,12 @@ def test_builds_on_a_start(evolved: Result) -> None:
 
 
 @pytest.mark.parametrize("iterations", [0, 1])
-def test_answers_on_the_smallest_budget(iterations: int) -> None:
+def test_smallest_budget_gives_a_plan(iterations: int) -> None:
     """Even without a generation there is an allocation that serves every task."""
     assert solve(hard(), "ga", time_limit_s=None, iterations=iterations).makespan is not None
 
 
-def test_nothing_to_do() -> None:
+def test_no_workload() -> None:
     """Without any workload all agents are idle, at makespan 0."""
     result = solve(Instance(ability=[1, 2], workload=[0, 0, 0]), "ga")
     assert result.allocation == Allocation([-1, -1])
@@ -163,7 +163,7 @@ def test_extreme_units(ratio: float) -> None:
     assert scaled.makespan == pytest.approx(ratio)
 
 
-def test_holds_its_time_limit_on_many_agents() -> None:
+def test_time_limit_is_respected_with_many_agents() -> None:
     """Ten thousand agents with ranges, and half a second: the budget holds to 10 % + 0.5 s of processor time."""
     rng = np.random.default_rng(0)
     instance = Instance(
@@ -179,7 +179,7 @@ def test_holds_its_time_limit_on_many_agents() -> None:
     assert time.process_time() - begin_s < 0.5 * 1.1 + 0.5
 
 
-def test_all_idle_where_nothing_can_be_served():
+def test_all_agents_idle_if_no_task_can_be_served():
     """Where no task that takes time is within reach, all agents are idle, at once and without warnings."""
     instance = Instance(
         ability=[1, 2], workload=[3, 4], agent_position=[[0, 0], [1, 1]], task_position=[[9, 9], [8, 8]],
@@ -190,7 +190,7 @@ def test_all_idle_where_nothing_can_be_served():
     assert result.runtime_s < 1
 
 
-def test_parameters_are_keywords() -> None:
+def test_parameters_are_set_by_keyword() -> None:
     """A larger population takes other steps from the same seed; wrong parameters are named."""
     large = GeneticAlgorithm(population=200)
     assert large.parameters == GeneticParameters(population=200)
@@ -202,7 +202,7 @@ def test_parameters_are_keywords() -> None:
         assert caught.value.place == name
 
 
-def test_islands_can_be_repeated() -> None:
+def test_islands_are_reproducible() -> None:
     """Counted in generations, which all islands share, populations in three threads give the same answer again."""
     settings = {"objective": "makespan-energy", "iterations": 70, "time_limit_s": None, "threads": 3}
     first, again = (solve(hard(), GeneticAlgorithm(population=16), **settings) for _ in range(2))
@@ -210,7 +210,7 @@ def test_islands_can_be_repeated() -> None:
     assert first.makespan < solve(hard(), "greedy").makespan
 
 
-def test_islands_exchange_their_best() -> None:
+def test_islands_exchange_their_best_plans() -> None:
     """What one island finds, the populations of all have after the next exchange, and no more generations are made."""
     instance = hard()
     search = Search(instance, Objective.MAKESPAN, Budget(None, 3 * GENERATIONS), threads=3)

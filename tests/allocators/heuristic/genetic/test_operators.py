@@ -50,7 +50,7 @@ def test_objectives_agree_with_the_evaluator(instance: Instance, rng: np.random.
         )
 
 
-def test_shortfall_by_hand() -> None:
+def test_shortfall_matches_hand_calculation() -> None:
     """Groups of 3 and 2 for workloads 6 and 2 have half of the first task as shortfall at T = 1, and none at T = 2."""
     encoding = Encoding(Instance(ability=[3, 2], workload=[6, 2]))
     genes = np.array([[0, 1]], dtype=np.int32)
@@ -58,7 +58,7 @@ def test_shortfall_by_hand() -> None:
     assert encoding.objectives(genes, 2.0).shortfall == pytest.approx([0.0])
 
 
-def test_codes_invert_each_other(instance: Instance) -> None:
+def test_decoding_inverts_encoding(instance: Instance) -> None:
     """Encoding keeps what is useful; agents that are not allowed, or on tasks without workload, become idle."""
     encoding = Encoding(instance)
     allocation = Allocation([1, 2, -1, 3, 4, 5, 2, 3, 4, 5, 0, 2])
@@ -67,7 +67,7 @@ def test_codes_invert_each_other(instance: Instance) -> None:
     assert encoding.encode(Allocation([4] * 12))[0] == encoding.idle  # agent 0 may do 0, 2 and 3 alone
 
 
-def test_children_take_whole_groups(rng: np.random.Generator) -> None:
+def test_children_inherit_whole_groups(rng: np.random.Generator) -> None:
     """Every gene of a child is that of a parent, and some of its groups are exactly those of the second parent."""
     one, other = (rng.integers(0, 5, size=(40, 20)).astype(np.int32) for _ in range(2))
     child = cross_groups(one, other, np.full(40, 0.4), rng)
@@ -77,7 +77,7 @@ def test_children_take_whole_groups(rng: np.random.Generator) -> None:
     assert (child != one).any(axis=1).mean() > 0.5
 
 
-def test_no_share_no_change(rng: np.random.Generator) -> None:
+def test_crossover_share_of_none_and_all(rng: np.random.Generator) -> None:
     """A child that takes no groups is its first parent; one that takes all is its second."""
     one, other = (rng.integers(0, 5, size=(9, 20)).astype(np.int32) for _ in range(2))
     assert (cross_groups(one, other, np.zeros(9), rng) == one).all()
@@ -129,7 +129,7 @@ def test_tournament_prefers_the_first(rng: np.random.Generator) -> None:
     assert np.mean(winners == 9) == pytest.approx(0.001, abs=0.002)
 
 
-def test_list_schedule_without_noise_is_greedy(instance: Instance, rng: np.random.Generator) -> None:
+def test_randomised_list_schedule_without_noise_is_greedy(instance: Instance, rng: np.random.Generator) -> None:
     """A row without noise takes agents in order of ability, each to the lowest W / h: 3, 2, 2, 1 on 5 and 3 by hand."""
     encoding = Encoding(Instance(ability=[3, 2, 2, 1], workload=[5, 3]))
     rows = list_schedules(encoding, np.zeros(1), np.zeros(1), rng, lambda: False)
@@ -139,7 +139,7 @@ def test_list_schedule_without_noise_is_greedy(instance: Instance, rng: np.rando
     assert len(np.unique(noisy, axis=0)) > 10
 
 
-def test_saving_moves_reduce_the_distance() -> None:
+def test_energy_saving_moves_reduce_the_distance() -> None:
     """Where energy counts, the agent drawn is nearer to the task drawn with it than to its own, and can reach it."""
     rng = np.random.default_rng(4)
     instance = Instance(

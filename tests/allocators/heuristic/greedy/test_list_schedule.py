@@ -16,7 +16,7 @@ from alloc.problems import Allocation, Instance, Objective, Reach, evaluate, few
 from alloc.problems.generate import Family, random_instance
 
 
-def test_by_hand() -> None:
+def test_plan_matches_hand_calculation() -> None:
     """4 goes to the largest task, 3 to the other, 2 to the lower W/h (3/5 against 4/6), 1 evens nothing."""
     assert greedy(Instance(ability=[1, 2, 3, 4], workload=[5, 6])) == Allocation([1, 0, 0, 1])
 
@@ -51,7 +51,7 @@ def test_feasible_and_complete(instance: Instance) -> None:
 
 
 @given(instances(most_agents=12, most_tasks=30), st.sampled_from([1.0, 1 / 3, 1e50]))
-def test_the_tree_does_what_the_scan_does(instance: Instance, factor: float) -> None:
+def test_tree_agrees_with_the_scan(instance: Instance, factor: float) -> None:
     """Compiled or not, each agent gets the same task: ranges, batteries, lists, travel times and unknown places."""
     instance = replace(
         instance,
@@ -85,7 +85,7 @@ def test_a_hundred_thousand_agents_with_short_ranges() -> None:
     assert not result.evaluation.unserved_tasks
 
 
-def test_never_worse_than_four_thirds() -> None:
+def test_makespan_is_at_most_four_thirds_of_the_bound() -> None:
     """With equal workloads list scheduling covers at least 3/4 of the optimum; here against the bound itself."""
     rng = np.random.default_rng(1)
     for _ in range(20):
@@ -103,7 +103,7 @@ def test_stops_when_time_is_up() -> None:
     assert solve(instance, "greedy", time_limit_s=0).makespan == pytest.approx(1.0)
 
 
-def test_alone_it_looks_ahead_as_far_as_in_a_run() -> None:
+def test_standalone_call_agrees_with_a_run() -> None:
     """Called without a search, agents that need time to travel go where those of a run go."""
     rng = np.random.default_rng(0)
     instance = Instance(
@@ -118,7 +118,7 @@ def test_alone_it_looks_ahead_as_far_as_in_a_run() -> None:
     assert (greedy(instance).task_of_agent >= 0).any()
 
 
-def test_threads_share_the_agents() -> None:
+def test_parallel_assignment_is_as_even_as_sequential() -> None:
     """Threads that assign agents side by side leave tasks about as even as one does, and no agent out."""
     instance = random_instance(Family(agents=6000, tasks=20, communication_range=0.8), 0)
     with patch.multiple(list_schedule, LEAST_SHARED=500, MOST_SCANNED=0):

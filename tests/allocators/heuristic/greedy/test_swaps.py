@@ -15,7 +15,7 @@ def never() -> bool:
 
 
 @given(allocated(speeds=False))
-def test_ability_stays_and_distance_does_not_grow(case: tuple[Instance, Allocation]) -> None:
+def test_swaps_keep_abilities_and_never_increase_distance(case: tuple[Instance, Allocation]) -> None:
     """Each task keeps the abilities that it has, and the total distance does not grow."""
     instance, allocation = case
     free = Instance(
@@ -31,7 +31,7 @@ def test_ability_stays_and_distance_does_not_grow(case: tuple[Instance, Allocati
     assert evaluate(free, Allocation(changed)).distance <= evaluate(free, allocation).distance
 
 
-def test_by_hand() -> None:
+def test_swaps_match_hand_calculation() -> None:
     """On a line, equal agents take the tasks in their own order; the one of another ability stays."""
     instance = Instance(
         ability=[1, 1, 1, 2],
@@ -42,7 +42,7 @@ def test_by_hand() -> None:
     assert reduce_distance(instance, np.array([2, 0, 1, 0]), never).tolist() == [0, 1, 2, 0]
 
 
-def test_interrupted_it_is_no_worse() -> None:
+def test_interrupted_swaps_never_increase_distance() -> None:
     """Out of time at once, the distance has not grown."""
     instance = paper(1, 0)
     task = np.random.default_rng(0).integers(0, instance.m, instance.n)
@@ -51,7 +51,7 @@ def test_interrupted_it_is_no_worse() -> None:
 
 
 @pytest.mark.parametrize("scenario", [1, 4])
-def test_greedy_saves_energy_where_it_counts(scenario: int) -> None:
+def test_greedy_saves_energy_if_in_the_objective(scenario: int) -> None:
     """The makespan is the same, the energy at least 30 % less."""
     fast, saving = (solve(paper(scenario, 0), "greedy", objective=goal) for goal in ("makespan", "makespan-energy"))
     assert saving.makespan == pytest.approx(fast.makespan)

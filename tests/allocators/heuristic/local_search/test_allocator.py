@@ -27,13 +27,13 @@ def allocator():
 
 
 @pytest.mark.parametrize("scenario", [1, 2, 3, 4])
-def test_paper_scenarios(allocator, scenario):
+def test_paper_scenarios_reach_the_optimum(allocator, scenario):
     """T = 1 takes a few iterations in each of the paper's scenarios."""
     result = solve(paper(scenario, 1500), allocator, iterations=40, time_limit_s=None)
     assert result.makespan == 1.0
 
 
-def test_energy_of_a_paper_scenario(allocator):
+def test_energy_of_a_paper_scenario_is_near_the_optimum(allocator):
     """Within a hundred thousand exchanges the energy comes near the least, which is 88.824 by `milp`."""
     result = solve(paper(1, 1000), allocator, objective="makespan-energy", iterations=100, time_limit_s=None)
     assert result.makespan == 1.0
@@ -41,7 +41,7 @@ def test_energy_of_a_paper_scenario(allocator):
 
 
 @pytest.mark.parametrize("seed", range(24))
-def test_tiny_instances(allocator, seed):
+def test_tiny_instances_match_brute_force(allocator, seed):
     """On tiny instances as many tasks are served as possible; if all are, makespan and energy are optimal."""
     instance = tiny_instance(seed)
     best = brute_force(instance)
@@ -64,7 +64,7 @@ def test_never_worse_than_start_or_greedy(allocator, objective, drawn):
         assert not evaluate(instance, serve_all(instance, other)).is_better_than(result.evaluation, objective)
 
 
-def test_slack_buys_energy(allocator):
+def test_slack_saves_energy(allocator):
     """With a tenth more time, the plan has less energy and keeps to that time."""
     instance = paper(1, 1001)
     strict = solve(instance, allocator, objective="makespan-energy", iterations=60, time_limit_s=None)
@@ -75,7 +75,7 @@ def test_slack_buys_energy(allocator):
     assert slack.makespan <= 1.1 * (1 + 1e-9)
 
 
-def test_travel_times_and_real_abilities(allocator):
+def test_travel_times_and_real_abilities_beat_greedy(allocator):
     """With speeds, and with real abilities in large groups, plans are faster than greedy's and have far less energy."""
     settings = {"objective": "makespan-energy", "iterations": 60, "time_limit_s": None, "makespan_slack": 0.01}
     for speed in ((1.0, 3.0), None):
@@ -93,7 +93,7 @@ def test_long_travel_of_equal_agents(allocator, seed, least):
     assert result.lower_bound <= result.makespan <= 1.01 * least
 
 
-def test_nothing_to_do(allocator):
+def test_no_servable_work(allocator):
     """Where no task with work can be served, or none has any, all agents are idle."""
     places = {"agent_position": [[0, 0], [0, 1]], "task_position": [[1, 0], [2, 0]]}
     for work, lists in (([0, 0], None), ([0, 1], [[0], [0]])):
@@ -112,7 +112,7 @@ def test_tasks_without_work(allocator):
     assert result.allocation == Allocation([0, 0])
 
 
-def test_few_agents_per_task(allocator):
+def test_few_agents_per_task_reach_the_bound(allocator):
     """With four agents per task and abilities up to 1000, the bound is met within a thousandth."""
     rng = np.random.default_rng(4)
     instance = Instance(ability=rng.integers(1, 1001, 100), workload=np.full(25, 1000.0))
@@ -120,7 +120,7 @@ def test_few_agents_per_task(allocator):
     assert result.gap < 1e-3
 
 
-def test_many_agents(allocator):
+def test_many_agents_reach_the_bound(allocator):
     """Without a table of distances, thirty thousand agents reach the bound, with less energy than greedy."""
     instance = random_instance(Family(agents=30_000, tasks=300, starts="own", battery=None), 2)
     result = solve(instance, allocator, objective="makespan-energy", iterations=40, time_limit_s=None)
@@ -130,7 +130,7 @@ def test_many_agents(allocator):
 
 @pytest.mark.parametrize("places", [{}, {"start_task": [0, 1]}, {"agent_position": [[0, 0], [3, 1]]}])
 @pytest.mark.parametrize("distances", [None, [("a1", "t2", 2.5)]])
-def test_nothing_is_compiled_within_a_run(allocator, places, distances, monkeypatch):
+def test_no_compilation_within_a_run(allocator, places, distances, monkeypatch):
     """Wherever places and distances come from, the arrays are of the types that loading has compiled the loops for."""
     kwargs = {"ability": [1, 2], "workload": [2, 2], "task_position": [[0, 0], [1, 2]], "distances": distances}
     instance, before = Instance(**kwargs, **places), annealing.anneal.signatures
@@ -142,7 +142,7 @@ def test_nothing_is_compiled_within_a_run(allocator, places, distances, monkeypa
     assert annealing.anneal.signatures == before
 
 
-def test_other_methods_can_use_it():
+def test_improve_continues_any_search():
     """`improve` continues from the best plan of any search, within its own limits, and submits better ones."""
     instance = paper(1, 1002)
     search = Search(instance, Objective.MAKESPAN_ENERGY, Budget(None, 1000), seed=1)
@@ -152,7 +152,7 @@ def test_other_methods_can_use_it():
     assert search.best.evaluation.is_better_than(first, Objective.MAKESPAN_ENERGY)
 
 
-def test_parameters_are_keywords():
+def test_parameters_are_set_by_keyword():
     """Parameters are set by keyword, over those of an object, and change the answer; wrong ones are named."""
     instance = paper(1, 1003)
     settings = {"objective": "makespan-energy", "iterations": 20, "time_limit_s": None}

@@ -14,7 +14,7 @@ from alloc.problems import IDLE, Allocation, Instance, evaluate, serve_all
 @settings(max_examples=40, deadline=None)
 @given(allocated())
 @pytest.mark.parametrize("limit", [0, 10_000])
-def test_incremental_updates_are_right(limit, drawn):
+def test_incremental_updates_match_recomputation(limit, drawn):
     """After many exchanges, groups, group abilities and the distance are what they are when computed from scratch."""
     instance, start = drawn
     with pytest.MonkeyPatch.context() as patch:
@@ -58,7 +58,7 @@ def test_helpers_can_reach_the_task():
     assert {int(draw_helper(state.arrays, state.plan, state.candidates, np.int32(1))) for _ in range(50)} == {2, 3}
 
 
-def test_helpers_come_from_tasks_nearby_where_there_is_no_table(monkeypatch):
+def test_helpers_come_from_nearby_tasks_without_a_table(monkeypatch):
     """Without a table of distances, most helpers are of a task next to the short one, hardly any of one far away."""
     monkeypatch.setattr(candidates, "TABLE_LIMIT", 0)
     places = np.linspace([0.0, 0.0], [1.0, 0.0], 100)
@@ -72,7 +72,7 @@ def test_helpers_come_from_tasks_nearby_where_there_is_no_table(monkeypatch):
     assert sum(abs(agent - 50) <= 5 for agent in drawn) > 100
 
 
-def test_prices_lead_out_of_least_shortfalls():
+def test_prices_escape_local_minima_of_the_shortfall():
     """A short task rises in price until it takes an agent from a task that then lacks more, but can be helped."""
     instance = Instance(ability=[1, 2, 1, 2], workload=[2, 3], allowed_tasks=[[0], [0, 1], [1], [1]])
     state = AnnealingState(instance, 0, 2)

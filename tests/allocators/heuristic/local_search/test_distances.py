@@ -14,7 +14,7 @@ from alloc.problems import Instance
 
 @settings(max_examples=60, deadline=None)
 @given(instances())
-def test_distances_are_those_of_reach(instance):
+def test_distances_match_reach(instance):
     """The loops compute what `Reach` does, to the last bit, and ``inf`` for what is out of reach."""
     arrays = instance_arrays(instance)
     expected = np.where(instance.reach.mask, instance.reach.distance, np.inf)
@@ -24,7 +24,7 @@ def test_distances_are_those_of_reach(instance):
     assert np.array_equal(tabulated.distance, expected)
 
 
-def test_extreme_coordinates():
+def test_extreme_coordinates_match_reach():
     """Coordinates at the ends of the valid range have the distances that `Reach` gives them."""
     instance = Instance(
         ability=[1, 1], workload=[1, 1], agent_position=[[1e60, 0], [0, 3e40]], task_position=[[0, 1e60], [5, 5]]

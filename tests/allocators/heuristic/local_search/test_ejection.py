@@ -31,7 +31,7 @@ def state_of(instance: Instance, plan: list[int]) -> AnnealingState:
     return state
 
 
-def test_an_ejection_goes_around(ring: Instance) -> None:
+def test_ejection_chain_solves_a_ring(ring: Instance) -> None:
     """No two tasks share two agents, so that no exchange helps; one ejection chain moves all three, and is kept."""
     state = state_of(ring, [0, 1, 2])
     weights = state.weights(1.0, 0.0, 100.0, 100.0)
@@ -42,7 +42,7 @@ def test_an_ejection_goes_around(ring: Instance) -> None:
     assert state.n_short == 0
 
 
-def test_an_ejection_without_gain_is_taken_back(ring: Instance) -> None:
+def test_ejection_chain_without_gain_is_undone(ring: Instance) -> None:
     """From the best plan, every ejection chain is undone: agents, abilities, cost and shortfalls are what they were."""
     state = state_of(ring, [1, 2, 0])
     before = [array.copy() for array in (state.plan.group_of_agent, state.plan.group_ability, state.plan.cost)]
@@ -54,7 +54,7 @@ def test_an_ejection_without_gain_is_taken_back(ring: Instance) -> None:
         assert state.plan.counter[N_SHORT] == 0
 
 
-def test_the_longest_chain_can_be_taken_back() -> None:
+def test_longest_ejection_chain_can_be_undone() -> None:
     """Every exchange of a chain may move its whole pool: undoing that restores all groups, wherever the log begins."""
     longest = 1 + (2 * LENGTH + 1) * POOL_BY_SUMS
     instance = Instance(

@@ -40,7 +40,7 @@ def test_every_part_has_tasks_and_their_agents(instance: Instance) -> None:
     assert np.bincount(part_of_agent).min() > instance.n / 6
 
 
-def test_joined_plan_is_what_its_parts_made_of_it(instance: Instance) -> None:
+def test_joined_plan_is_consistent_with_its_parts(instance: Instance) -> None:
     """After many rounds no group is wrong: cost and abilities are those computed anew, and the best can be flown."""
     parts = parts_of(instance, 3)
     state, weights = parts.state, LocalSearchParameters().weights(parts.state, 0.01, HARD)
@@ -59,14 +59,14 @@ def test_joined_plan_is_what_its_parts_made_of_it(instance: Instance) -> None:
     assert best < before
 
 
-def test_few_tasks_are_no_parts() -> None:
+def test_few_tasks_are_not_partitioned() -> None:
     """With too few tasks for two parts, the whole plan is annealed as by a single thread."""
     assert parts_of(random_instance(Family(agents=20, tasks=5), 0), 4).count == 1
 
 
 @pytest.mark.parametrize("objective", OBJECTIVES)
 @pytest.mark.parametrize("method", ["local-search", "lp-round"])
-def test_same_number_of_threads_same_answer(instance: Instance, method: str, objective: str) -> None:
+def test_same_number_of_threads_gives_same_answer(instance: Instance, method: str, objective: str) -> None:
     """Counted in iterations, a run by three threads can be repeated, and is no worse than its start."""
     allocator = load(method)
     settings = {"objective": objective, "iterations": 40, "time_limit_s": None, "threads": 3}

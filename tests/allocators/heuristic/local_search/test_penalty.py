@@ -38,7 +38,7 @@ def lose(state):
     assert state.n_short > 0
 
 
-def test_the_penalty_falls_without_shortfalls_down_to_a_limit(state):
+def test_penalty_decreases_without_shortfalls_to_a_minimum(state):
     """Periods that end without a shortfall lower it, and it stays above the limit."""
     factor = PenaltyFactor(state, 10**9, 1e9)
     factor.update(1)
@@ -48,7 +48,7 @@ def test_the_penalty_falls_without_shortfalls_down_to_a_limit(state):
     assert factor.value == LOWEST
 
 
-def test_the_search_returns_to_its_best_plan(state):
+def test_search_returns_to_its_best_plan(state):
     """After periods in a row with shortfalls, which raise the penalty, the plan is the best one again, to the agent."""
     factor, best = PenaltyFactor(state, 10**9, 1e9), state.best
     lose(state)
@@ -63,7 +63,7 @@ def test_the_search_returns_to_its_best_plan(state):
     assert evaluate(state.instance, state.best).makespan <= state.makespan * (1 + 1e-9)
 
 
-def test_a_short_budget_leaves_the_penalty_alone(state):
+def test_penalty_is_constant_on_a_short_budget(state):
     """Where the budget allows few exchanges for each agent, nothing adapts."""
     factor = PenaltyFactor(state, 10**9, LEAST_EXCHANGES - 1)
     for _ in range(10):

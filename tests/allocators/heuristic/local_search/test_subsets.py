@@ -42,7 +42,7 @@ def least_cost(work, size, needs, weights):
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_enumeration_is_exact(seed):
+def test_enumeration_finds_the_cheapest_subset(seed):
     """Enumeration finds the cheapest subset."""
     size = 1 + seed % 8
     work, needs = pool_of(seed, size, integer=False)
@@ -52,7 +52,7 @@ def test_enumeration_is_exact(seed):
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_sums_are_exact(seed):
+def test_dynamic_programming_finds_the_cheapest_subset(seed):
     """Dynamic programming over all sums finds the cheapest subset where abilities are integers."""
     size = 1 + seed % 8
     work, needs = pool_of(seed, size, integer=True)
@@ -63,7 +63,7 @@ def test_sums_are_exact(seed):
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_halves_have_the_least_shortfall(seed):
+def test_meet_in_the_middle_finds_the_least_shortfall(seed):
     """Where agents cost nothing, meeting in the middle finds a subset whose shortfall is as small as any."""
     size = 2 + seed % 8
     work, needs = pool_of(seed, size, integer=False)

@@ -29,7 +29,7 @@ def travelling(agents: int, tasks: int) -> Instance:
 
 
 @pytest.mark.parametrize("threads", [1, 2])
-def test_a_plan_from_prices_is_tightened(threads: int) -> None:
+def test_plan_from_prices_is_tightened(threads: int) -> None:
     """Few exchanges close most of the gap that a plan from prices has; the count of iterations is kept to."""
     search = Search(travelling(6_000, 60), Objective.MAKESPAN, Budget(None, 60), threads=threads)
     priced = plan_by_prices(search)
@@ -41,7 +41,7 @@ def test_a_plan_from_prices_is_tightened(threads: int) -> None:
     assert 0 < search.iteration <= 60
 
 
-def test_the_same_seed_tightens_to_the_same_plan() -> None:
+def test_same_seed_gives_same_plan() -> None:
     """Where iterations are counted, two runs give one answer."""
     instance = travelling(5_000, 50)
     first, second = (solve(instance, "local-search", time_limit_s=None, iterations=20, threads=2) for _ in range(2))
@@ -50,7 +50,7 @@ def test_the_same_seed_tightens_to_the_same_plan() -> None:
 
 
 @pytest.mark.parametrize(("agents", "loaded"), [(100, 0), (5_000, 1)])
-def test_loops_of_prices_are_loaded_before_the_clock_starts(
+def test_price_loops_are_compiled_before_the_clock_starts(
     monkeypatch: pytest.MonkeyPatch, agents: int, loaded: int
 ) -> None:
     """The method loads them where it uses them, and `solve` asks it to, whatever its name is."""

@@ -16,7 +16,7 @@ def relaxation(instance: Instance, by_place: bool = True) -> tuple[Relaxation, S
     return lp, Search(instance, Objective.MAKESPAN_ENERGY, Budget(None))
 
 
-def test_least_makespan_by_hand() -> None:
+def test_least_makespan_matches_hand_calculation() -> None:
     """Two thirds of the ability go to two thirds of the work; with task lists, each agent does its own."""
     lp, search = relaxation(Instance(ability=[4, 2], workload=[4, 2]))
     assert lp.least_makespan(search) == pytest.approx(1.0)
@@ -28,7 +28,7 @@ def test_least_makespan_by_hand() -> None:
 
 
 @pytest.mark.parametrize("seed", seeds_where(lambda one: all_can_be_served(one) and not one.has_travel_time, 20))
-def test_never_above_the_optimum(seed: int) -> None:
+def test_relaxation_never_exceeds_the_optimum(seed: int) -> None:
     """The least fractional makespan lies below the least of all allocations that serve every task."""
     instance = tiny_instance(seed)
     best = brute_force(instance)
@@ -37,7 +37,7 @@ def test_never_above_the_optimum(seed: int) -> None:
     assert lp.least_makespan(search) <= best.makespan * (1 + 1e-6)
 
 
-def test_rounding_is_close() -> None:
+def test_rounding_lacks_at_most_one_agent_per_task() -> None:
     """Before any repair, no task of the first scenario lacks more than one agent of ability 10."""
     instance = paper(1, 1000)
     lp, search = relaxation(instance)
@@ -46,7 +46,7 @@ def test_rounding_is_close() -> None:
     assert (evaluate(instance, rounded).group_ability >= instance.workload / makespan - 10 - 1e-6).all()
 
 
-def test_energy_near_its_bound() -> None:
+def test_energy_is_near_its_bound() -> None:
     """Scenario 1 is solved to T = 1 at an energy not far above its bound."""
     result = solve(paper(1, 1000), "lp-round", objective="makespan-energy", iterations=200, time_limit_s=None)
     assert result.makespan == pytest.approx(1.0)
@@ -66,7 +66,7 @@ def test_large_programmes_are_refused() -> None:
         solve(large, "lp-round", objective="makespan-energy", time_limit_s=1)
 
 
-def test_parameters_are_keywords() -> None:
+def test_parameters_are_set_by_keyword() -> None:
     """Parameters are set by keyword; wrong ones are named."""
     assert LpRound(repair_iterations=0).parameters == LpRoundParameters(repair_iterations=0)
     with pytest.raises(InputError) as caught:

@@ -30,7 +30,7 @@ def test_no_task_loses_more_than_one_agent(seed: int) -> None:
         assert share[on] @ integer[on] >= share[on] @ amount[on] - parts.max() - 1e-6
 
 
-def test_whole_plans_stay() -> None:
+def test_integer_plans_are_unchanged() -> None:
     """What is integer already, but for the last digits of a solver, is left alone."""
     agent_class, task = np.array([0, 0, 1]), np.array([0, 1, 1])
     amount = np.array([2 - 1e-10, 1.0, 3 + 1e-10])
@@ -38,7 +38,7 @@ def test_whole_plans_stay() -> None:
     assert rounded.tolist() == [2, 1, 3]
 
 
-def test_cost_is_not_raised() -> None:
+def test_cost_never_increases() -> None:
     """Of two ways to fill two half slots, the cheaper is taken: no dearer than the fractions were."""
     agent_class, task = np.array([0, 0, 1, 1]), np.array([0, 1, 0, 1])
     cost = np.array([1.0, 9.0, 9.0, 1.0])

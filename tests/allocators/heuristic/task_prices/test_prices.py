@@ -36,7 +36,7 @@ def travelling(agents: int, tasks: int, seed: int = 0, *, reach: float = 0.5) ->
 
 
 @pytest.mark.parametrize("seed", seeds_where(all_can_be_served, 40))
-def test_no_prices_exclude_the_optimum(seed):
+def test_bound_never_exceeds_the_optimum(seed):
     """On tiny instances of every sort, the bound is at most the optimum of brute force, and at least the simple one."""
     instance = tiny_instance(seed)
     if instance.workload.any():
@@ -44,7 +44,7 @@ def test_no_prices_exclude_the_optimum(seed):
         assert makespan_lower_bound(instance) <= bound <= brute_force(instance).makespan * (1 + 1e-9)
 
 
-def test_shortlists_have_the_most_valuable_tasks():
+def test_shortlists_contain_the_most_valuable_tasks():
     """The tree finds the same tasks and values as a look at all pairs."""
     instance = travelling(200, 60)
     prices = TaskPrices(instance, 1.0, map, 1)
@@ -57,7 +57,7 @@ def test_shortlists_have_the_most_valuable_tasks():
     assert (np.argsort(-value, axis=1)[:, :5] == bidders.lists.task).all()
 
 
-def test_prices_do_not_run_away_where_shortlists_are_too_short():
+def test_prices_raise_the_bound_with_short_shortlists():
     """Where agents reach all of many tasks, prices raise the bound as well."""
     instance = travelling(20_000, 300, reach=np.inf)
     assert prices_of(instance).bound > 1.005 * makespan_lower_bound(instance)
@@ -71,7 +71,7 @@ def test_prices_raise_the_bound_to_the_fractional_optimum():
     assert prices.makespan < 1.0005 * prices.bound
 
 
-def test_threads_prove_the_same():
+def test_bound_does_not_depend_on_threads():
     """Agents in several parts have the same value."""
     instance = travelling(1_000, 20)
     bounds = []
@@ -82,7 +82,7 @@ def test_threads_prove_the_same():
     assert bounds[0] == pytest.approx(bounds[1], rel=1e-5)
 
 
-def test_a_rounded_plan_serves_tasks_nearly_as_prices_say():
+def test_rounded_plan_lacks_little_of_the_work():
     """A rounded plan sends agents where they can go, and lacks little of the work."""
     instance = travelling(3_000, 30)
     prices = prices_of(instance)
@@ -92,7 +92,7 @@ def test_a_rounded_plan_serves_tasks_nearly_as_prices_say():
     assert score.makespan < 1.03 * prices.bound
 
 
-def test_agents_that_settle_even_out_what_tasks_lack():
+def test_best_response_passes_reduce_shortfalls():
     """Without passes in which agents change to where they bring most, the same plan is much slower."""
     instance = travelling(3_000, 30)
     prices = prices_of(instance)
@@ -103,7 +103,7 @@ def test_agents_that_settle_even_out_what_tasks_lack():
 
 
 @pytest.mark.parametrize("count", [10, 1_000])
-def test_a_sample_has_the_ability_of_all_in_every_quarter(count):
+def test_sample_represents_all_ability_in_every_quarter(count):
     """Representatives stand for all ability, and in each quarter of the square for about as much as there is."""
     instance = travelling(4_000, 10, seed=3)
     chosen, ability = representatives(instance, count)
@@ -115,7 +115,7 @@ def test_a_sample_has_the_ability_of_all_in_every_quarter(count):
     assert sampled == pytest.approx(total, rel=0.01 if count == 1_000 else 0.6)
 
 
-def test_a_sample_is_all_where_there_are_few_or_no_places():
+def test_sample_with_few_agents_or_no_positions():
     """No more agents are chosen than there are; without positions, any agents stand for all."""
     instance = Instance(ability=np.arange(1, 101), workload=[1.0, 2.0])
     chosen, ability = representatives(instance, 1_000)
@@ -126,7 +126,7 @@ def test_a_sample_is_all_where_there_are_few_or_no_places():
     assert ability.sum() == pytest.approx(5050)
 
 
-def test_where_nothing_is_scarce_prices_end_early():
+def test_prices_end_early_without_travel_times():
     """Without travel times, where all reach the like of everything, a sample shows that prices prove nothing."""
     instance = Instance(ability=np.ones(100), workload=np.full(10, 5.0), allowed_tasks=[[*range(10)]] * 100)
     prices = TaskPrices(instance, makespan_lower_bound(instance), map, 1)
@@ -134,7 +134,7 @@ def test_where_nothing_is_scarce_prices_end_early():
     assert prices.bidders is None
 
 
-def test_a_lack_far_away_is_evened_out_in_few_iterations():
+def test_distant_shortfall_is_priced_in_few_iterations():
     """Where agents are at one end of a line, work at the other, and each agent reaches a part, bounds come soon."""
     n, m = 8_000, 200
     rng = np.random.default_rng(0)
@@ -166,6 +166,6 @@ def test_regions_are_the_nodes_of_the_tree():
         assert weight[:, node] == pytest.approx(np.where(inside, (end - begin) ** -0.25, 0.0))
 
 
-def test_a_region_of_one_task_is_none():
+def test_single_tasks_are_not_regions():
     """One task has a variable of its own already."""
     assert regions_of(build_tree(np.zeros((3, 3)), np.array([1]))).shape == (1, 0)

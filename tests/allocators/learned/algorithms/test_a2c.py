@@ -20,7 +20,7 @@ def test_returns_match_the_definition() -> None:
     assert got[:, 0].tolist() == [1 + 0.5 * 2 + 0.25 * 4 + 0.125 * 8, 2 + 0.5 * 4 + 0.25 * 8, 4 + 0.5 * 8]
 
 
-def test_nothing_follows_the_end_of_a_game() -> None:
+def test_no_return_beyond_the_end_of_a_game() -> None:
     """The step that stops a game earns its own reward only, whatever is written behind it."""
     reward = torch.tensor([[1.0], [2.0], [99.0]])
     alive = torch.tensor([[True], [True], [False]])
@@ -28,7 +28,7 @@ def test_nothing_follows_the_end_of_a_game() -> None:
 
 
 @pytest.mark.parametrize("rules", [PLANNING, Rules(turn=TurnRule.SIMULTANEOUS), PAPER])
-def test_segments_follow_on_each_other(rules: Rules) -> None:
+def test_segments_continue_each_other(rules: Rules) -> None:
     """Playing on from the state after a segment earns what one long game earns: rewards add up to the rise."""
     board = probe("pairing").board
     learner, generator = A2c(), torch.Generator().manual_seed(0)
@@ -42,7 +42,7 @@ def test_segments_follow_on_each_other(rules: Rules) -> None:
     assert not torch.equal(second.state.slot[0], reset(board).slot)
 
 
-def test_likelier_after_a_gain_and_unlikelier_after_a_loss() -> None:
+def test_probabilities_follow_advantages() -> None:
     """One step raises the probability of what earned more than expected, and lowers that of what earned less."""
     board = probe("right_task").board
     for sign in (1.0, -1.0):
@@ -56,12 +56,12 @@ def test_likelier_after_a_gain_and_unlikelier_after_a_loss() -> None:
         assert torch.sign((again - played.log_probability[0]).sum()).item() == sign
 
 
-def test_a_job_depends_on_state_and_job_only() -> None:
+def test_job_depends_only_on_state_and_job() -> None:
     """Stored between jobs and restored in another learner, training continues bit for bit as without a break."""
     assert_resumes_elsewhere(A2c)
 
 
-def test_simultaneous_turns_can_be_trained_on() -> None:
+def test_simultaneous_turns_can_be_trained() -> None:
     """The paper's turn rule works as well, and weights stay finite."""
     learner = A2c()
     before = weights(learner)

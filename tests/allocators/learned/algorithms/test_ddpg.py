@@ -13,7 +13,7 @@ GAIN = torch.tensor([[1.0, -torch.inf, 0.5, 0.0]], dtype=torch.float64)
 QUALITY = torch.tensor([[2.0, -torch.inf, 5.0, 0.0]], dtype=torch.float64)
 
 
-def test_relaxed_actions_by_hand() -> None:
+def test_relaxed_actions_match_hand_calculation() -> None:
     """A softmax at a temperature, with probability 0 for closed bids; at low temperature the best bid has all of it."""
     e = torch.tensor([2.0, 1.0, 0.0], dtype=torch.float64).exp()
     assert relaxed_action(GAIN, 0.5)[0, [0, 2, 3]].tolist() == pytest.approx((e / e.sum()).tolist())
@@ -21,14 +21,14 @@ def test_relaxed_actions_by_hand() -> None:
     assert relaxed_action(GAIN, 0.01)[0, 0] == pytest.approx(1.0)
 
 
-def test_the_value_of_relaxed_actions_is_multilinear() -> None:
+def test_value_of_relaxed_actions_is_multilinear() -> None:
     """At a corner it is the value of that bid, between corners the mean of their values."""
     corners = torch.eye(4, dtype=torch.float64)[[0, 2, 3]]
     assert relaxed_value(corners, QUALITY.expand(3, -1)).tolist() == [2.0, 5.0, 0.0]
     assert relaxed_value(corners.mean(0, keepdim=True), QUALITY).item() == pytest.approx(7 / 3)
 
 
-def test_gradient_against_finite_differences() -> None:
+def test_gradient_matches_finite_differences() -> None:
     """(18): the gradient through the relaxed action agrees with finite differences."""
     scores = GAIN.clone().requires_grad_()
     relaxed_value(relaxed_action(scores, 0.7), QUALITY).sum().backward()
@@ -41,7 +41,7 @@ def test_gradient_against_finite_differences() -> None:
         assert scores.grad[0, column].item() == pytest.approx(rise.item(), abs=1e-7)
 
 
-def test_entropy_by_hand_with_a_finite_gradient() -> None:
+def test_entropy_matches_hand_calculation_with_a_finite_gradient() -> None:
     """Two equal shares have log 2; the gradient is finite where a bid is closed."""
     scores = torch.tensor([[1.0, -torch.inf, 1.0]]).requires_grad_()
     entropy = entropy_of(relaxed_action(scores, 1.0))
@@ -51,7 +51,7 @@ def test_entropy_by_hand_with_a_finite_gradient() -> None:
     assert torch.isfinite(scores.grad).all()
 
 
-def test_targets_of_states() -> None:
+def test_targets_match_the_definition() -> None:
     """The target critic values the target actor's relaxed action; without an open bid, the target is the reward."""
     learner = Ddpg(parameters=DdpgParameters(gamma=0.5, softmax_temperature=1.0))
     for parameter in learner.targets.parameters():
@@ -64,7 +64,7 @@ def test_targets_of_states() -> None:
     assert learner.td_targets(board, none, torch.ones(1), PLANNING).item() == 1.0
 
 
-def test_polyak_updates_by_hand() -> None:
+def test_polyak_updates_match_hand_calculation() -> None:
     """With tau = 0.1 a weight moves by a tenth of the difference."""
     old, new = torch.nn.Linear(1, 1), torch.nn.Linear(1, 1)
     for network, value in ((old, 1.0), (new, 2.0)):
@@ -75,7 +75,7 @@ def test_polyak_updates_by_hand() -> None:
     assert new.weight.item() == 2.0
 
 
-def test_a_job_depends_on_state_and_job_only() -> None:
+def test_job_depends_only_on_state_and_job() -> None:
     """Stored with its memory between jobs and restored in another learner, training continues bit for bit."""
     assert_resumes_elsewhere(Ddpg)
 

@@ -13,13 +13,13 @@ from alloc.allocators.learned.play.transitions import next_state
 from alloc.problems.game import PLANNING, State, action_mask, reset
 
 
-def test_target_by_hand() -> None:
+def test_target_matches_hand_calculation() -> None:
     """r + gamma max Q: what follows counts unless the game is over."""
     reward, following, over = torch.tensor([1.0, 1.0]), torch.tensor([4.0, 4.0]), torch.tensor([False, True])
     assert td_target(reward, following, over, 0.5).tolist() == [3.0, 1.0]
 
 
-def test_double_estimate_by_hand() -> None:
+def test_double_estimate_matches_hand_calculation() -> None:
     """One network picks the move, the other one values it."""
     value, picker = torch.tensor([[1.0, 5.0, 0.0]]), torch.tensor([[3.0, 2.0, 0.0]])
     assert best_move_value(value, value).tolist() == [5.0]
@@ -38,7 +38,7 @@ def without_heads(learner: Dqn, bid: float, reserve: float) -> None:
     ("bid", "reserve", "following"),
     [(7.0, 3.0, 4.0), (2.0, 3.0, 0.0)],
 )
-def test_targets_of_states(bid: float, reserve: float, following: float) -> None:
+def test_targets_match_the_definition(bid: float, reserve: float, following: float) -> None:
     """Stopping follows for 0 where all bids are below the reserve; where no bid is open, nothing else can follow."""
     learner = Dqn(parameters=DqnParameters(gamma=0.5, double_q=False))
     without_heads(learner, bid, reserve)
@@ -50,7 +50,7 @@ def test_targets_of_states(bid: float, reserve: float, following: float) -> None
     assert learner.td_targets(board, none, reward, PLANNING).tolist() == [1.0, 2.0]
 
 
-def test_a_game_that_was_cut_off_is_not_over() -> None:
+def test_truncated_game_is_bootstrapped() -> None:
     """The last move of a game cut off by the number of steps is followed by the value of the state after it."""
     learner = Dqn(parameters=DqnParameters(gamma=0.5, double_q=False))
     without_heads(learner, 7.0, 3.0)
@@ -65,7 +65,7 @@ def flat(network: torch.nn.Module) -> Tensor:
     return torch.cat([one.detach().flatten() for one in network.parameters()])
 
 
-def test_target_network_is_renewed_in_periods() -> None:
+def test_target_network_is_updated_periodically() -> None:
     """The target network holds still for as many updates as the parameter says, and is then the one that learns."""
     learner = Dqn(parameters=DqnParameters(target_update_interval=3, replay_ratio=0.0))
     learner.train_on(TrainingJob(0, 50, curriculum=probe("pairing")))
@@ -78,7 +78,7 @@ def test_target_network_is_renewed_in_periods() -> None:
         assert torch.equal(flat(learner.target), flat(learner.network)) == (number == 3)
 
 
-def test_a_job_depends_on_state_and_job_only() -> None:
+def test_job_depends_only_on_state_and_job() -> None:
     """Stored with its memory between jobs and restored in another learner, training continues bit for bit."""
     assert_resumes_elsewhere(Dqn)
 

@@ -34,7 +34,7 @@ def rate(member: StateDict) -> float:
     return float(member["optimiser"]["param_groups"][0]["lr"])
 
 
-def test_fitness_by_hand() -> None:
+def test_fitness_matches_hand_calculation() -> None:
     """(12): each term relative to the largest of the population; the cost is subtracted."""
     parameters = BreedingParameters(return_weight=1.0, entropy_weight=0.5, cost_weight=0.25)
     got = fitness([2.0, 4.0], [1.0, 0.5], [100, 50], parameters)
@@ -51,7 +51,7 @@ def test_elite_passes_unchanged() -> None:
 
 
 @pytest.mark.parametrize("count", [1, 2, 3])
-def test_small_populations_breed_too(count: int) -> None:
+def test_small_populations_breed(count: int) -> None:
     """There is a child among two members, however large the elite; a single member stays as it is."""
     before = members(count)
     after = breed(before, list(range(count)), BreedingParameters(elite=5, mutation_probability=1.0), seed=1)
@@ -84,7 +84,7 @@ def test_mutation_changes_some_weights_and_the_step_size_a_little() -> None:
     assert [rate(member) for member in before] == rates
 
 
-def test_children_are_states_that_a_learner_loads() -> None:
+def test_children_are_loadable_states() -> None:
     """A child has its parent's optimiser and weights of its own, and shares no storage with the parent."""
     before = members(2)
     child = breed(before, [1.0, 0.0], BreedingParameters(elite=1, mutation_probability=1.0), seed=0)[1]
@@ -106,7 +106,7 @@ def test_breeding_is_seeded_and_leaves_the_global_generator_alone() -> None:
     assert random.random() == expected
 
 
-def test_operators_draw_as_deaps_do_but_from_their_own_generator(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_operators_match_deap_with_their_own_generator(monkeypatch: pytest.MonkeyPatch) -> None:
     """With the same seed the outcome is that of DEAP's own operators, without the global generator."""
     parents = [_Genome([float(number), -1.0, 2.5], number, float(number % 3)) for number in range(5)]
 

@@ -24,7 +24,7 @@ def job(seed: int = 1, decisions: int = 60) -> TrainingJob:
     return TrainingJob(seed, decisions, GAMES)
 
 
-def test_a_gene_changes_biases_alone_and_can_be_taken_back() -> None:
+def test_gene_changes_only_biases_and_is_reversible() -> None:
     """What a member adds is in the vectors of one dimension; expressing the first member gives the first weights."""
     (network,) = initialised(SMALL, 3, 1)
     before = copy.deepcopy(network)
@@ -36,7 +36,7 @@ def test_a_gene_changes_biases_alone_and_can_be_taken_back() -> None:
     torch.testing.assert_close(weights(network), weights(before))
 
 
-def test_a_single_member_learns_as_ppo_does() -> None:
+def test_single_member_learns_exactly_as_ppo() -> None:
     """With one gene the weights are those of `Ppo`, bit by bit."""
     parameters = GappoParameters(genes=1)
     one, other = GeneticPpo(SMALL, parameters, seed=2), Ppo(SMALL, parameters, seed=2)
@@ -44,7 +44,7 @@ def test_a_single_member_learns_as_ppo_does() -> None:
     assert weights(one.policy).equal(weights(other.policy))
 
 
-def test_members_take_turns_and_are_bred() -> None:
+def test_members_take_turns_and_breed() -> None:
     """Three members share decisions, replay and weights; after a generation the fittest's gene comes first."""
     learner = GeneticPpo(SMALL, GappoParameters(genes=3, breeding_interval=3, gene_sigma=0.1), seed=4)
     first = learner.genes.vectors.clone()
@@ -60,7 +60,7 @@ def test_members_take_turns_and_are_bred() -> None:
     assert sum(kept) >= 2  # the elite
 
 
-def test_without_generations_genes_stay() -> None:
+def test_genes_are_constant_without_generations() -> None:
     """With an interval of 0 members take turns, and nothing is bred."""
     learner = GeneticPpo(SMALL, GappoParameters(genes=2, breeding_interval=0, gene_sigma=0.1), seed=4)
     first = learner.genes.vectors.clone()
@@ -70,7 +70,7 @@ def test_without_generations_genes_stay() -> None:
     assert len(learner.since) == 1
 
 
-def test_the_fittest_is_the_policy() -> None:
+def test_fittest_member_is_the_policy() -> None:
     """The member with the highest returns is expressed after a generation, and is the first of all policies."""
     learner = GeneticPpo(SMALL, GappoParameters(genes=2, breeding_interval=2, gene_sigma=0.1), seed=4)
     best = learner.genes.vectors[1].clone()
@@ -82,7 +82,7 @@ def test_the_fittest_is_the_policy() -> None:
     assert not weights(learner.policies()[1]).allclose(weights(learner.policy), atol=1e-4)
 
 
-def test_a_stored_population_goes_on_as_if_nothing_had_happened() -> None:
+def test_restored_population_continues_identically() -> None:
     """Genes and the returns since the last generation are part of the state."""
     parameters = GappoParameters(genes=2, breeding_interval=4, gene_sigma=0.1)
     whole = GeneticPpo(SMALL, parameters, seed=5)

@@ -66,7 +66,7 @@ def test_every_number_has_a_range(kind: type[Any]) -> None:
         (BreedingParameters, "mutation_probability", 1.01),
     ],
 )
-def test_ends_of_ranges(kind: type[Any], name: str, wrong: Any) -> None:
+def test_values_outside_ranges_are_refused(kind: type[Any], name: str, wrong: Any) -> None:
     """What divides by nothing, learns nothing or moves away is out, also where other parameters are changed."""
     with pytest.raises(InputError, match=f"{name}: must be a"):
         kind(**{name: wrong})
@@ -74,14 +74,14 @@ def test_ends_of_ranges(kind: type[Any], name: str, wrong: Any) -> None:
         replace(kind(), **{name: wrong})
 
 
-def test_what_is_in_range() -> None:
+def test_values_at_the_ends_of_ranges_are_accepted() -> None:
     """The ends that make sense are in, and so are numbers of numpy's."""
     assert PpoParameters(buffer_size=0, gae_lambda=0, gamma=1, learning_rate=1, ent_coef=0.0, target_kl=None)
     assert PpoParameters(update_epochs=np.int64(2), clip_coef=np.float32(0.5))  # type: ignore[arg-type]
     assert BreedingParameters(elite=0, mutation_probability=0, crossover_probability=1, mutation_sigma=0)
 
 
-def test_no_entropy_bonus() -> None:
+def test_entropy_bonus_of_zero_stays_zero() -> None:
     """A bonus that begins at 0 stays there."""
     curriculum, _ = games_on([paper_like(8, 2, 35, 0)], Curriculum(games=(2, 2)))
     learner = Ddpg(NetworkSize(4, 4, 1), DdpgParameters(ent_coef=0.0))

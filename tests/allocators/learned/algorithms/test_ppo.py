@@ -56,13 +56,15 @@ def played(learner: Ppo, board: Board, rules: Rules = PLANNING, steps: int = 3, 
         (0.1, -1.0, 0.1, -0.1),
     ],
 )
-def test_clipped_surrogate(ratio: float, advantage: float, centre: float, expected: float) -> None:
+def test_clipped_surrogate_matches_the_definition(
+    ratio: float, advantage: float, centre: float, expected: float
+) -> None:
     """(13), (14) with epsilon 0.2 around 1 and around other centres: gains are clipped, losses are not."""
     got = clipped_surrogate(torch.tensor([ratio]), torch.tensor([advantage]), 0.2, torch.tensor([centre]))
     assert got.item() == pytest.approx(expected)
 
 
-def test_beyond_the_clip_nothing_pulls() -> None:
+def test_surrogate_has_no_gradient_beyond_the_clip() -> None:
     """The surrogate has a slope within the clip, and none where a gain lies beyond it."""
     ratio = torch.tensor([1.1, 1.3, 0.7, 1.3, 0.7], requires_grad=True)
     clipped_surrogate(ratio, torch.tensor([2.0, 2.0, -2.0, -2.0, 2.0]), 0.2).sum().backward()
@@ -70,7 +72,7 @@ def test_beyond_the_clip_nothing_pulls() -> None:
     assert ratio.grad.tolist() == [2.0, 0.0, 0.0, -2.0, 2.0]
 
 
-def test_value_loss_by_hand() -> None:
+def test_value_loss_matches_hand_calculation() -> None:
     """(15): half the mean of the squared errors 1, -3 and 2."""
     got = value_loss(torch.tensor([1.0, 5.0, 0.0]), torch.tensor([2.0, 2.0, 2.0]))
     assert got.item() == pytest.approx((1 + 9 + 4) / 6)
@@ -86,19 +88,19 @@ def test_value_loss_by_hand() -> None:
         (9.0, None, 1e-3),
     ],
 )
-def test_the_rate_follows_the_divergence(divergence: float, target: float | None, expected: float) -> None:
+def test_learning_rate_adapts_to_the_divergence(divergence: float, target: float | None, expected: float) -> None:
     """Twice too far slows learning down, half too near speeds it up, and without a target nothing does."""
     assert adapted_learning_rate(1e-3, divergence, target, 1.0) == pytest.approx(expected)
 
 
-def test_the_rate_has_bounds() -> None:
+def test_learning_rate_is_bounded() -> None:
     """It does not grow beyond the highest, nor fall below the lowest, but for a highest that is lower still."""
     assert adapted_learning_rate(1e-3, 0.0, 0.01, 1.2e-3) == 1.2e-3
     assert adapted_learning_rate(1.1 * MIN_LEARNING_RATE, 1.0, 0.01, 1.0) == MIN_LEARNING_RATE
     assert adapted_learning_rate(1e-3, 0.0, 0.01, 1e-6) == 1e-6
 
 
-def test_a_schedule_lowers_the_rate() -> None:
+def test_schedule_lowers_the_learning_rate() -> None:
     """Without a target the step size falls with progress, from the highest to a share of it."""
     learner = Ppo(SMALL, PpoParameters(learning_rate=1.0, max_learning_rate=1e-3, final_lr_fraction=0.1))
     for progress, expected in ((0.0, 1e-3), (0.5, 0.55e-3), (1.0, 1e-4)):
@@ -130,7 +132,7 @@ def test_samples_of_fresh_games(board: Board, rules: Rules) -> None:
 
 
 @both_turns
-def test_a_step_goes_against_the_loss_written_out(board: Board, rules: Rules) -> None:
+def test_update_follows_the_gradient_of_the_loss(board: Board, rules: Rules) -> None:
     """One update by plain gradient descent changes the weights by the gradient of (13), (15) and the entropy."""
     parameters = PpoParameters(update_epochs=1, minibatch_size=10_000, max_grad_norm=1e9, vf_coef=0.7, ent_coef=0.1)
     learner = Ppo(SMALL, parameters, seed=3)
@@ -154,7 +156,7 @@ def test_a_step_goes_against_the_loss_written_out(board: Board, rules: Rules) ->
         torch.testing.assert_close(new, old - 0.1 * slope, atol=1e-5, rtol=1e-4)
 
 
-def test_what_went_better_than_expected_becomes_likelier(board: Board) -> None:
+def test_probabilities_follow_advantages(board: Board) -> None:
     """After an update the change of each action's probability goes with its advantage."""
     learner = Ppo(SMALL, PpoParameters(ent_coef=0.0, vf_coef=0.0))
     fresh = played(learner, board)
@@ -167,7 +169,7 @@ def test_what_went_better_than_expected_becomes_likelier(board: Board) -> None:
     assert float((shift * samples.advantage[:, None].expand_as(real)[real]).mean()) > 0
 
 
-def test_divergence_tells_how_far_the_policy_moved(board: Board) -> None:
+def test_divergence_grows_with_the_step(board: Board) -> None:
     """No step, no divergence; and a longer step diverges more, so that the rate can follow."""
     found = []
     for rate in (0.0, 1e-4, 1e-2):
@@ -179,7 +181,7 @@ def test_divergence_tells_how_far_the_policy_moved(board: Board) -> None:
 
 
 @both_turns
-def test_reuse_by_the_same_network_is_no_reuse(board: Board, rules: Rules) -> None:
+def test_reuse_by_the_same_network_gives_the_same_samples(board: Board, rules: Rules) -> None:
     """Trajectories that today's network played itself are the same samples, fresh or from the buffer."""
     learner = Ppo(SMALL, PpoParameters(minibatch_size=2))
     fresh = played(learner, board, rules, steps=30)
@@ -194,7 +196,7 @@ def test_reuse_by_the_same_network_is_no_reuse(board: Board, rules: Rules) -> No
 
 
 @both_turns
-def test_reuse_by_another_network_is_corrected(board: Board, rules: Rules) -> None:
+def test_reuse_by_another_network_is_importance_corrected(board: Board, rules: Rules) -> None:
     """Ratios of old samples are centred where today's policy is, and traces cut by how likely whole steps are."""
     parameters = PpoParameters(gamma=0.9, gae_lambda=0.8)
     old, new = Ppo(SMALL, seed=1), Ppo(SMALL, seed=2)
@@ -218,7 +220,7 @@ def test_reuse_by_another_network_is_corrected(board: Board, rules: Rules) -> No
     torch.testing.assert_close(samples.target, target[kept.alive], atol=1e-4, rtol=1e-4)
 
 
-def test_a_single_decision_does_not_spoil_the_weights() -> None:
+def test_single_decision_leaves_weights_finite() -> None:
     """One agent, one task, one step: nothing can be compared, and nothing breaks."""
     board = layout(Instance(ability=[1], workload=[1]))
     learner = Ppo(SMALL)
@@ -226,7 +228,7 @@ def test_a_single_decision_does_not_spoil_the_weights() -> None:
     assert weights(learner).isfinite().all()
 
 
-def test_extreme_games_do_not_spoil_the_weights() -> None:
+def test_extreme_games_leave_weights_finite() -> None:
     """Figures of all sizes, and tasks that nobody can do, leave weights finite."""
     wild = [
         Instance(ability=[1e-9, 1e9], workload=[1e9, 1e-9], priority=[1e9, 0]),
@@ -244,7 +246,7 @@ def test_extreme_games_do_not_spoil_the_weights() -> None:
         assert weights(learner).isfinite().all()
 
 
-def test_the_buffer_is_learned_from() -> None:
+def test_buffer_is_used_for_learning() -> None:
     """With a buffer the second job's updates differ from those without, and cost more evaluations."""
     costs, ends = [], []
     for capacity in (0, 10_000):
@@ -258,7 +260,7 @@ def test_the_buffer_is_learned_from() -> None:
     assert not torch.equal(*ends)
 
 
-def test_the_statistics_of_a_job() -> None:
+def test_job_statistics_match_the_games() -> None:
     """Decisions reach those of the job; rewards are in the units of the utility, whatever their scale."""
     games = probe("pairing")
     reports = [
@@ -274,13 +276,13 @@ def test_the_statistics_of_a_job() -> None:
 
 
 @pytest.mark.parametrize("parameters", [PpoParameters(), GappoParameters()], ids=["ppo", "gappo"])
-def test_a_job_depends_on_state_and_job_only(parameters: PpoParameters) -> None:
+def test_job_depends_only_on_state_and_job(parameters: PpoParameters) -> None:
     """Stored with its buffer between jobs and restored in another learner, training continues bit for bit."""
     assert_resumes_elsewhere(lambda seed: Ppo(SMALL, parameters, seed))
 
 
 @pytest.mark.slow
-def test_it_learns_when_all_choose_at_once() -> None:
+def test_rewards_rise_with_simultaneous_choices() -> None:
     """Rewards rise to nine tenths of the best there is under the other turn rule as well."""
     games, learner = probe("right_task"), Ppo(SMALL, PpoParameters(learning_rate=3e-3))
     best = float((best_utility(games.board) - utility(games.board, reset(games.board), AT_ONCE)).mean())
@@ -288,7 +290,7 @@ def test_it_learns_when_all_choose_at_once() -> None:
     assert sum(rewards[-4:]) / 4 > 0.9 * best > sum(rewards[:4]) / 4
 
 
-def test_begins_are_not_shared() -> None:
+def test_initial_weights_use_their_own_generator() -> None:
     """The seed of the first weights is the learner's own: torch's generator goes on as if nothing had happened."""
     torch.manual_seed(5)
     expected = torch.rand(3)

@@ -11,14 +11,14 @@ from alloc.allocators.learned.network.actor_critic import NetworkSize
 from alloc.problems import InputError
 
 
-def test_learners_by_name() -> None:
+def test_learners_are_made_by_name() -> None:
     """A name gives a learner of this size."""
     learner = new_learner("ppo", NetworkSize(8, 8, 2), PpoParameters(), 0)
     assert isinstance(learner, Ppo)
     assert learner.policy.size == NetworkSize(8, 8, 2)
 
 
-def test_settings_are_read_as_the_kind_of_their_defaults() -> None:
+def test_settings_are_parsed_by_the_type_of_their_defaults() -> None:
     """Whole numbers, broken ones and none are told apart."""
     read = method_parameters("ppo", {"update_epochs": "5", "clip_coef": "0.1", "target_kl": "none"})
     assert read == PpoParameters(update_epochs=5, clip_coef=0.1, target_kl=None)
@@ -38,14 +38,14 @@ def test_settings_are_read_as_the_kind_of_their_defaults() -> None:
         ("ppo", {"update_epochs": "0"}, "update_epochs must be a whole number from 1 to 1e[+]06, got 0$"),
     ],
 )
-def test_mistakes_are_named(method: str, settings: dict[str, str], message: str) -> None:
+def test_wrong_settings_are_reported(method: str, settings: dict[str, str], message: str) -> None:
     """Unknown methods, unknown parameters, unreadable values and such out of range are told."""
     with pytest.raises(InputError, match=message):
         method_parameters(method, settings)
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_an_unknown_parameter_is_answered_by_all(method: str) -> None:
+def test_unknown_parameter_error_lists_all_parameters(method: str) -> None:
     """All names and defaults of the method are listed, just as they are set."""
     with pytest.raises(InputError) as caught:
         method_parameters(method, {"unknown": "1"})

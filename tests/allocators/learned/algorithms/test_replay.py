@@ -36,13 +36,13 @@ def drawn(replay: ReplayBuffer, draws: int = 60) -> list[Trajectories]:
     return list({id(one): one for one in (replay.draw(generator) for _ in range(draws)) if one is not None}.values())
 
 
-def test_an_empty_buffer_has_nothing_to_draw() -> None:
+def test_empty_buffer_yields_nothing() -> None:
     """None comes from a buffer in which nothing was put."""
     assert ReplayBuffer(100).draw(torch.Generator()) is None
     assert len(ReplayBuffer(100)) == 0
 
 
-def test_the_oldest_go_first(trajectories: list[Trajectories]) -> None:
+def test_oldest_trajectories_are_dropped_first(trajectories: list[Trajectories]) -> None:
     """The states kept never exceed the capacity, and are those of the latest trajectories that fit in."""
     sizes = [one.evaluations for one in trajectories]
     replay = ReplayBuffer(sum(sizes[2:]))
@@ -55,7 +55,7 @@ def test_the_oldest_go_first(trajectories: list[Trajectories]) -> None:
     assert {id(one) for one in drawn(replay)} == {id(one) for one in trajectories[2:]}
 
 
-def test_what_is_too_large_is_not_kept(trajectories: list[Trajectories]) -> None:
+def test_oversized_trajectories_are_not_kept(trajectories: list[Trajectories]) -> None:
     """A trajectory beyond the capacity does not stay, and a buffer without capacity keeps nothing."""
     for capacity in (0, trajectories[0].evaluations - 1):
         replay = ReplayBuffer(capacity)
@@ -64,7 +64,7 @@ def test_what_is_too_large_is_not_kept(trajectories: list[Trajectories]) -> None
         assert replay.draw(torch.Generator()) is None
 
 
-def test_all_are_drawn_as_often(trajectories: list[Trajectories]) -> None:
+def test_trajectories_are_drawn_uniformly(trajectories: list[Trajectories]) -> None:
     """Of 3,000 draws each of five trajectories gets 600, within four standard deviations."""
     replay, generator = ReplayBuffer(10_000), torch.Generator().manual_seed(2)
     for one in trajectories:

@@ -23,7 +23,7 @@ def job(seed: int, decisions: int = 1) -> TrainingJob:
     return TrainingJob(seed, decisions, GAMES)
 
 
-def test_only_the_member_whose_turn_it_is_learns() -> None:
+def test_only_the_active_member_learns() -> None:
     """The first member's update leaves the others' weights as those of `GeneticPpo`, and fills the buffer of all."""
     parameters = GappoParameters(genes=3, gene_sigma=0.1)
     learner, shared = SeparateMembers(SMALL, parameters, seed=4), GeneticPpo(SMALL, parameters, seed=4)
@@ -35,7 +35,7 @@ def test_only_the_member_whose_turn_it_is_learns() -> None:
     assert len(learner.replay) > 0
 
 
-def test_the_fittest_comes_first() -> None:
+def test_fittest_member_comes_first() -> None:
     """After a generation the policy is the member with the highest returns, with all of its weights."""
     learner = SeparateMembers(SMALL, GappoParameters(genes=2, breeding_interval=2, gene_sigma=0.1), seed=4)
     learner.train_on(job(1))
@@ -47,7 +47,7 @@ def test_the_fittest_comes_first() -> None:
     assert learner.policies()[0] is learner.policy
 
 
-def test_a_stored_population_goes_on_as_if_nothing_had_happened() -> None:
+def test_restored_population_continues_identically() -> None:
     """Weights, step sizes, the buffer and the returns since the last generation are the state."""
     parameters = GappoParameters(genes=2, breeding_interval=4, gene_sigma=0.1)
     whole, half = SeparateMembers(SMALL, parameters, seed=5), SeparateMembers(SMALL, parameters, seed=0)

@@ -31,14 +31,14 @@ def test_round_trip(tmp_path: Path, networks: list[ActorCritic]) -> None:
             assert torch.equal(weight, after.state_dict()[name])
 
 
-def test_absent_file(tmp_path: Path) -> None:
+def test_missing_file_is_named(tmp_path: Path) -> None:
     """A missing file is named."""
     with pytest.raises(InputError, match=r"nowhere\.safetensors: no such policy file"):
         load_policy(tmp_path / "nowhere.safetensors", "gappo")
 
 
 @pytest.mark.parametrize("content", [b"", b"\0" * 7, b"hello, world", pickle.dumps({"a": 1}), b"\xff" * 64])
-def test_other_files(tmp_path: Path, content: bytes) -> None:
+def test_other_files_are_refused(tmp_path: Path, content: bytes) -> None:
     """Whatever is no policy is refused in one line, pickles without being run."""
     path = tmp_path / "p.safetensors"
     path.write_bytes(content)
@@ -47,7 +47,7 @@ def test_other_files(tmp_path: Path, content: bytes) -> None:
     assert "\n" not in str(caught.value)
 
 
-def test_a_folder_is_no_policy(tmp_path: Path) -> None:
+def test_folders_and_empty_names_are_refused(tmp_path: Path) -> None:
     """A folder is called one, and no name at all is told."""
     with pytest.raises(InputError, match="is a folder"):
         load_policy(tmp_path, "gappo")
@@ -55,7 +55,7 @@ def test_a_folder_is_no_policy(tmp_path: Path) -> None:
         load_policy("", "gappo")
 
 
-def test_policy_of_another_method(tmp_path: Path, networks: list[ActorCritic]) -> None:
+def test_policy_of_another_method_is_refused(tmp_path: Path, networks: list[ActorCritic]) -> None:
     """A policy that another method trained is not used by mistake."""
     save_policy(tmp_path / "p.safetensors", networks, "dqn")
     with pytest.raises(InputError, match="holds a policy of dqn; use it with the method dqn"):
@@ -66,7 +66,7 @@ def test_policy_of_another_method(tmp_path: Path, networks: list[ActorCritic]) -
 
 
 @pytest.mark.parametrize("weight", [math.nan, math.inf, -math.inf])
-def test_weights_that_are_not_finite(tmp_path: Path, networks: list[ActorCritic], weight: float) -> None:
+def test_non_finite_weights_are_refused(tmp_path: Path, networks: list[ActorCritic], weight: float) -> None:
     """A policy of a training that went astray is refused, whichever network it is in."""
     with torch.no_grad():
         next(networks[1].parameters()).flatten()[-1] = weight
@@ -76,7 +76,7 @@ def test_weights_that_are_not_finite(tmp_path: Path, networks: list[ActorCritic]
             load_policy(tmp_path / "p.safetensors", method)
 
 
-def test_the_same_networks_give_the_same_bytes(tmp_path: Path, networks: list[ActorCritic]) -> None:
+def test_same_networks_give_the_same_bytes(tmp_path: Path, networks: list[ActorCritic]) -> None:
     """Files of two trainings that went alike are alike, and others can read them as before."""
     figures = {"seed": 3, "place": "Århus"}
     files = [tmp_path / f"{number}.safetensors" for number in range(6)]
@@ -88,7 +88,7 @@ def test_the_same_networks_give_the_same_bytes(tmp_path: Path, networks: list[Ac
         assert torch.equal(file.get_tensor("1.critic.0.weight"), networks[1].state_dict()["critic.0.weight"])
 
 
-def test_policy_of_another_feature_set(tmp_path: Path, networks: list[ActorCritic]) -> None:
+def test_policy_of_another_feature_set_is_refused(tmp_path: Path, networks: list[ActorCritic]) -> None:
     """A policy for other observations is an error, not a wrong answer."""
     save_policy(tmp_path / "p.safetensors", networks, "gappo")
     path = tmp_path / "p.safetensors"
@@ -97,7 +97,7 @@ def test_policy_of_another_feature_set(tmp_path: Path, networks: list[ActorCriti
         load_policy(path, "gappo")
 
 
-def test_weights_that_do_not_fit(tmp_path: Path, networks: list[ActorCritic]) -> None:
+def test_weights_of_other_sizes_are_refused(tmp_path: Path, networks: list[ActorCritic]) -> None:
     """Weights of other sizes than the description says are refused."""
     save_policy(tmp_path / "p.safetensors", networks, "gappo")
     path = tmp_path / "p.safetensors"
@@ -106,7 +106,7 @@ def test_weights_that_do_not_fit(tmp_path: Path, networks: list[ActorCritic]) ->
         load_policy(path, "gappo")
 
 
-def test_truncated_files(tmp_path: Path, networks: list[ActorCritic]) -> None:
+def test_truncated_files_are_refused(tmp_path: Path, networks: list[ActorCritic]) -> None:
     """A file cut short anywhere, in its head or in its weights, is refused in one line."""
     save_policy(tmp_path / "p.safetensors", networks, "gappo")
     path = tmp_path / "p.safetensors"
@@ -118,7 +118,7 @@ def test_truncated_files(tmp_path: Path, networks: list[ActorCritic]) -> None:
         assert "\n" not in str(caught.value)
 
 
-def test_fewer_networks_than_said(tmp_path: Path, networks: list[ActorCritic]) -> None:
+def test_file_with_fewer_networks_than_declared_is_refused(tmp_path: Path, networks: list[ActorCritic]) -> None:
     """A file that promises more networks than it holds is refused."""
     save_policy(tmp_path / "p.safetensors", networks, "gappo")
     path = tmp_path / "p.safetensors"
@@ -127,7 +127,7 @@ def test_fewer_networks_than_said(tmp_path: Path, networks: list[ActorCritic]) -
         load_policy(path, "gappo")
 
 
-def test_tensors_without_description(tmp_path: Path) -> None:
+def test_tensors_without_metadata_are_refused(tmp_path: Path) -> None:
     """A safetensors file from elsewhere is no policy."""
     save_file({"a": torch.zeros(2)}, tmp_path / "p.safetensors")
     with pytest.raises(InputError, match="does not describe its networks"):

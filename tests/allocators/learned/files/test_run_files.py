@@ -9,7 +9,7 @@ from alloc.allocators.learned.missions.policy_file import SHIPPED
 from alloc.problems import InputError
 
 
-def test_a_training_in_missions_goes_on_over_its_policy(tmp_path: Path) -> None:
+def test_policies_of_missions_are_recognised(tmp_path: Path) -> None:
     """Policies of missions are told from other safetensors, so that such a training can be resumed."""
     files = RunFiles.beside(tmp_path / "p.safetensors", None, None, None)
     files.policy.write_bytes(SHIPPED.read_bytes())

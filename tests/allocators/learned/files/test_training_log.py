@@ -26,7 +26,7 @@ def test_lines_are_appended_to_the_history(tmp_path: Path) -> None:
 
 
 @pytest.mark.needs("tensorboard")
-def test_events_hold_every_figure(tmp_path: Path) -> None:
+def test_events_contain_every_column(tmp_path: Path) -> None:
     """TensorBoard shows each column over the decisions; steps that a resumed run repeats appear once."""
     from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
@@ -39,7 +39,7 @@ def test_events_hold_every_figure(tmp_path: Path) -> None:
     assert [(event.step, event.value) for event in events.Scalars("training/cost")] == [(10, 0.5), (20, 0.125)]
 
 
-def test_without_tensorboard_the_extra_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_missing_tensorboard_names_the_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Whoever asks for event files is told what to install, and nothing is written."""
     monkeypatch.setitem(sys.modules, "torch.utils.tensorboard", None)
     with pytest.raises(InputError, match=r"alloc-mrta\[train\]"):

@@ -37,7 +37,7 @@ def pair(metric: str = "euclidean") -> Mission:
 
 
 @pytest.mark.parametrize("metric", ["euclidean", "manhattan"])
-def test_free_agents_at_one_place_part(tmp_path: Path, metric: str) -> None:
+def test_free_agents_at_one_place_choose_different_tasks(tmp_path: Path, metric: str) -> None:
     """Two agents that know the same at the same hour go to different tasks, without a message, and none turns round."""
     save_network(tmp_path / "policy.safetensors", first_network(3), "gappo")
     run = simulate(pair(metric), NetworkPolicy(policy=tmp_path / "policy.safetensors"))
@@ -52,7 +52,7 @@ PLACES = [[0.0, 0.0], [0.4, 0.6]]
 
 
 @pytest.mark.parametrize(("metric", "rivals"), [("euclidean", 1), ("manhattan", 0)])
-def test_nearer_others_are_those_by_the_metric(metric: str, rivals: int) -> None:
+def test_nearer_agents_are_determined_by_the_metric(metric: str, rivals: int) -> None:
     """An agent is told of another without a task as nearer if it is so by the metric of the instance."""
     instance = Instance(
         ability=[1, 1], workload=[9], agent_position=PLACES, task_position=[[1.0, 0.0]], speed=[1, 1], metric=metric
@@ -65,7 +65,7 @@ def test_nearer_others_are_those_by_the_metric(metric: str, rivals: int) -> None
 
 
 @pytest.mark.parametrize(("ways", "rivals"), [(known.EUCLIDEAN_WAYS, 1), (known.MANHATTAN_WAYS, 0)])
-def test_nearer_others_are_those_by_the_metric_for_agents_in_turn(ways: int, rivals: int) -> None:
+def test_nearer_agents_are_determined_by_the_metric_for_agents_in_turn(ways: int, rivals: int) -> None:
     """Agents that decide in turn are told the same."""
     together = together_for(2, 1)
     together.own[:, [known.X, known.Y]] = PLACES

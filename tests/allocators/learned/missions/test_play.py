@@ -30,7 +30,7 @@ def scored(options: np.ndarray, seed: int) -> np.ndarray:
     return room.scores[: len(options)]
 
 
-def test_compiled_scores_are_those_of_torch() -> None:
+def test_compiled_scores_match_torch() -> None:
     """The compiled network gives the scores of the torch module, also where the latter has rows that are no option."""
     options = np.random.default_rng(0).normal(size=(7, FEATURES)).astype(np.float32)
     filled = torch.zeros(1, 9, FEATURES)
@@ -59,7 +59,7 @@ def test_scores_do_not_depend_on_the_order_of_options() -> None:
         ("failures", "local", (20, 40)),  # agents stand at one place, and are rivals or not by a rounding
     ],
 )
-def test_policy_is_the_same_in_both_simulations(
+def test_policy_gives_the_same_measures_in_both_simulations(
     tmp_path: Path, family: str, knowledge: str, size: tuple[int, int]
 ) -> None:
     """The policy by the contract, and the compiled one, reach the same measures."""
@@ -75,7 +75,7 @@ def test_policy_is_the_same_in_both_simulations(
         assert getattr(found, name) == (None if value is None else pytest.approx(value, rel=1e-9)), name
 
 
-def test_agents_send_seldom_and_sooner_with_news() -> None:
+def test_message_rate_depends_on_news() -> None:
     """After the first two, every tenth time; news goes out as soon as that allows; one message is kept for it."""
     counted, news = np.zeros(1, np.intp), np.zeros(1, np.intp)
     saved = room_for(1, 1, 10).saved  # of three messages
@@ -87,7 +87,7 @@ def test_agents_send_seldom_and_sooner_with_news() -> None:
     assert sent == [0, 1, 10, 15, 20, 30, 40, 50, 60, 80, 90]
 
 
-def test_policy_file_for_missions_is_checked(tmp_path: Path) -> None:
+def test_policy_file_for_instances_is_refused(tmp_path: Path) -> None:
     """A policy file for instances is refused with what to do."""
     from alloc.allocators.learned.missions import policy_file
 

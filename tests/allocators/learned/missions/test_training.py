@@ -35,7 +35,7 @@ def weights_of(trainer: MissionTrainer) -> torch.Tensor:
     return torch.cat([weight.flatten() for member in members for weight in member])
 
 
-def test_run_is_resumed_to_the_same_curve(tmp_path: Path) -> None:
+def test_resumed_run_gives_the_same_curve(tmp_path: Path) -> None:
     """A run that is stored in its evolution, and one that is not interrupted, have the same members and reports."""
     whole, stored, resumed = (MissionTrainer(TINY, 3) for _ in range(3))
     for _ in range(3):
@@ -50,14 +50,14 @@ def test_run_is_resumed_to_the_same_curve(tmp_path: Path) -> None:
     assert not torch.equal(weights_of(whole), weights_of(MissionTrainer(TINY, 3)))
 
 
-def test_run_of_others_is_not_resumed(tmp_path: Path) -> None:
+def test_checkpoint_with_other_parameters_is_refused(tmp_path: Path) -> None:
     """A checkpoint of other parameters is refused."""
     MissionTrainer(TINY, 3).save(tmp_path / "run.checkpoint")
     with pytest.raises(InputError, match="candidates"):
         MissionTrainer(replace(TINY, candidates=6), 3).resume(tmp_path / "run.checkpoint")
 
 
-def test_what_is_trained_can_be_loaded(tmp_path: Path) -> None:
+def test_trained_policy_can_be_loaded(tmp_path: Path) -> None:
     """The policy file of a run holds its best network."""
     trainer = MissionTrainer(TINY, 1)
     trainer.advance()
@@ -72,7 +72,7 @@ def test_unknown_families_are_refused(tmp_path: Path) -> None:
         train_on_missions("gappo", tmp_path / "policy.safetensors", families=["stedy"])
 
 
-def test_curriculum_grows_harder() -> None:
+def test_curriculum_becomes_harder() -> None:
     """At first missions are of one family; later of all sorts, and of sizes within its bounds."""
     curriculum, rng = MissionCurriculum(agents=(2, 3), tasks=(2, 4)), np.random.default_rng(0)
     early = {len(mission.arrays.events) > 0 for mission, _ in curriculum.draw(rng, 3, 0.0)}
@@ -83,7 +83,7 @@ def test_curriculum_grows_harder() -> None:
     assert len(FAMILIES) == 8
 
 
-def test_advantages_are_what_a_play_gained_beside_the_others() -> None:
+def test_advantages_are_relative_to_other_episodes() -> None:
     """The advantage of a decision is what other plays lost more in the same hours, 0 on average."""
     group = [record_for(1, 1, 2, ideal=4.0) for _ in range(3)]
     for record, lost in zip(group, (0.0, 1.0, 2.0), strict=True):

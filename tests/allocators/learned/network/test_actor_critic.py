@@ -21,7 +21,7 @@ def network(request: pytest.FixtureRequest) -> ActorCritic:
     return ActorCritic(SIZES[request.param]).requires_grad_(False)
 
 
-def test_relabelling_agents_and_tasks_relabels_the_bids(network: ActorCritic) -> None:
+def test_network_is_permutation_equivariant(network: ActorCritic) -> None:
     """Names of agents and tasks do not matter, neither to bids, nor to reserve and value."""
     instance = paper_like(12, 4, 50, seed=0)
     agents, tasks = np.random.default_rng(1).permutation(12), np.random.default_rng(2).permutation(4)
@@ -39,7 +39,7 @@ def test_relabelling_agents_and_tasks_relabels_the_bids(network: ActorCritic) ->
     torch.testing.assert_close(one.value, two.value, atol=1e-4, rtol=1e-4)
 
 
-def test_games_side_by_side_are_scored_as_alone(network: ActorCritic) -> None:
+def test_batched_games_are_scored_as_single_ones(network: ActorCritic) -> None:
     """What a network says of a game does not depend on the other games of the batch."""
     board = layout(*(paper_like(8, 3, 34, seed) for seed in range(5)))
     together = network(board, reset(board))
@@ -49,7 +49,7 @@ def test_games_side_by_side_are_scored_as_alone(network: ActorCritic) -> None:
             torch.testing.assert_close(one[0], two[game], atol=1e-5, rtol=1e-5)
 
 
-def test_near_candidates_are_scored_as_in_the_dense_board(network: ActorCritic) -> None:
+def test_sparse_candidates_are_scored_as_on_the_dense_board(network: ActorCritic) -> None:
     """The pointer looks up the same places whether candidates are all tasks or some in any order."""
     instance = paper_like(20, 9, 90, seed=4)
     dense, near = layout(instance), layout(instance, near=5)
@@ -65,7 +65,7 @@ def test_near_candidates_are_scored_as_in_the_dense_board(network: ActorCritic) 
     torch.testing.assert_close(all_.gather(2, near.candidates)[near.legal], some[near.legal], atol=1e-4, rtol=1e-4)
 
 
-def test_agents_without_ability_are_not_heard() -> None:
+def test_agents_without_ability_do_not_affect_encodings() -> None:
     """Padding agents of a region change nothing of the encodings of places."""
     torch.manual_seed(2)
     network = ActorCritic(SIZES["attention"]).requires_grad_(False)
@@ -95,7 +95,7 @@ def test_extremes_stay_finite(network: ActorCritic, name: str) -> None:
     assert all(weight.grad is None or weight.grad.isfinite().all() for weight in network.parameters())
 
 
-def test_attention_hears_of_members_and_neighbours() -> None:
+def test_attention_depends_on_group_members_and_neighbours() -> None:
     """Two equals that exchange places change what all places know; without attention nobody notices."""
     instance = Instance(
         ability=[1, 1, 1], workload=[1, 1, 1], task_position=[[0, 0], [1, 0], [2, 0]], start_task=[0, 1, 2]

@@ -114,7 +114,7 @@ every_turn = pytest.mark.parametrize("rules", [PLANNING, ONE_MOVE, AT_ONCE], ids
 
 
 @every_turn
-def test_probabilities_of_all_rounds_by_plain_python(board: Board, rules: Rules) -> None:
+def test_probabilities_match_plain_python(board: Board, rules: Rules) -> None:
     """Each possible round is as probable as its product of softmaxes says, and all together are certain."""
     state, scores = reset(board), scores_of(board)
     expected = chances(board, state, scores, rules)
@@ -130,7 +130,7 @@ def test_probabilities_of_all_rounds_by_plain_python(board: Board, rules: Rules)
 
 
 @every_turn
-def test_draws_are_as_frequent_as_probable(board: Board, rules: Rules) -> None:
+def test_sample_frequencies_match_probabilities(board: Board, rules: Rules) -> None:
     """Chi-square of 20,000 draws with a fixed seed stays within four standard deviations of its mean."""
     draws = 20_000
     state, scores = reset(board), scores_of(board, 3)
@@ -163,7 +163,7 @@ def test_temperature_divides_the_scores(board: Board, temperature: float) -> Non
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_without_temperature_the_best_is_done(board: Board, seed: int) -> None:
+def test_zero_temperature_takes_the_best_action(board: Board, seed: int) -> None:
     """At temperature 0 bids are granted from the best down; agents that choose at once each take their best."""
     state, scores = reset(board), scores_of(board, seed)
     _, n, c = board.shape
@@ -188,7 +188,9 @@ def test_without_temperature_the_best_is_done(board: Board, seed: int) -> None:
     rules=st.sampled_from([PLANNING, ONE_MOVE, AT_ONCE, PAPER, Rules(flying=True)]),
     spread=st.sampled_from([1.0, 300.0]),
 )
-def test_what_is_drawn_has_a_probability(instance: Instance, seed: int, rules: Rules, spread: float) -> None:
+def test_sampled_actions_have_finite_log_probabilities(
+    instance: Instance, seed: int, rules: Rules, spread: float
+) -> None:
     """Every sampled action, in games that go on or have ended, has a finite log-probability, never above 0."""
     board = layout(instance, instance, instance)
     state, generator = reset(board), torch.Generator().manual_seed(seed)
@@ -205,7 +207,7 @@ def test_what_is_drawn_has_a_probability(instance: Instance, seed: int, rules: R
         state = step(board, state, slot)
 
 
-def test_entropy_by_plain_python(board: Board) -> None:
+def test_entropy_matches_plain_python(board: Board) -> None:
     """Entropy is that of the first draw of a round, and that of the mean agent where all choose at once."""
     state, scores = reset(board), scores_of(board)
     first = rounds(board, state, scores, 1).values()
@@ -217,7 +219,7 @@ def test_entropy_by_plain_python(board: Board) -> None:
     assert 4 * entropy.item() == pytest.approx(-sum(p * log(p) for p in everything), abs=1e-5)
 
 
-def test_probabilities_have_gradients(board: Board) -> None:
+def test_log_probabilities_have_gradients(board: Board) -> None:
     """Raising the score of what was granted raises its probability, and barred bids are given no gradient."""
     scores = scores_of(board)
     bids, reserve = scores.bids.clone().requires_grad_(), scores.reserve.clone().requires_grad_()

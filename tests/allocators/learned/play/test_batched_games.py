@@ -25,7 +25,7 @@ def games_on(board: Board, copies: int = 1) -> Games:
 @pytest.mark.parametrize("attention", [True, False])
 @pytest.mark.parametrize("total", [True, False])
 @pytest.mark.parametrize("name", BOARDS)
-def test_compiled_games_are_those_of_torch(name: str, total: bool, attention: bool) -> None:
+def test_compiled_games_match_torch(name: str, total: bool, attention: bool) -> None:
     """Played greedily, every game ends in the same best position, to single precision."""
     board = BOARDS[name]()
     torch.manual_seed(3)
@@ -38,7 +38,7 @@ def test_compiled_games_are_those_of_torch(name: str, total: bool, attention: bo
     assert torch.equal(compiled.slot, expected.slot)
 
 
-def test_draws_are_legal_and_repeat() -> None:
+def test_sampled_games_are_legal_and_reproducible() -> None:
     """Drawn games keep to reach, differ from each other, and are the same again by the same seed."""
     board = BOARDS["ranged"]()
     torch.manual_seed(3)
@@ -52,7 +52,7 @@ def test_draws_are_legal_and_repeat() -> None:
     assert legal.gather(2, first.slot[..., None]).all()
 
 
-def test_time_to_stop() -> None:
+def test_stop_request_ends_play_with_a_position() -> None:
     """When it is time to stop, the first game still has a position, and those not begun are infinitely bad."""
     board = layout(*(paper_like(20, 4, 80, seed) for seed in range(3)))
     network = ActorCritic().eval().requires_grad_(False)

@@ -28,7 +28,9 @@ def sized(agents: int, tasks: int) -> Instance:
         (1, MOST_TASKS + 1, None, f"more than the {MOST_TASKS}"),
     ],
 )
-def test_limits(agents: int, tasks: int, limit: float | None, reason: str | None) -> None:
+def test_size_limits_depend_on_time_and_memory(
+    agents: int, tasks: int, limit: float | None, reason: str | None
+) -> None:
     """Small ones are never refused; large ones are where the time is short or memory is, with the limit named."""
     said = too_large(sized(agents, tasks), Budget(time_limit_s=limit, iterations=1))
     if reason is None:

@@ -79,7 +79,7 @@ def assert_scored_anew(network: ActorCritic, scores: LocalScores, board: Board, 
 @pytest.mark.parametrize(
     ("rules", "anew"), [(Rules(), 0.5), (Rules(most_moves=1), 1.0), (Rules(turn=TurnRule.SIMULTANEOUS), 0.0)]
 )
-def test_incremental_scores_equal_full_ones(
+def test_incremental_scores_match_full_scores(
     board: Board, network: ActorCritic, rules: Rules, anew: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """After every step of random play all open bids are scored as if anew, while games end and are dropped."""
@@ -97,7 +97,7 @@ def test_incremental_scores_equal_full_ones(
     assert_scored_anew(network, scores, board, state)
 
 
-def test_chunks_make_no_difference(board: Board, network: ActorCritic, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_scores_do_not_depend_on_chunks(board: Board, network: ActorCritic, monkeypatch: pytest.MonkeyPatch) -> None:
     """Scored a few agents at a time, the first scores are the same, and a wish to stop is heard in between."""
     state = reset(board)
     monkeypatch.setattr(rollout, "SCORE_CHUNK", 100)
@@ -113,7 +113,7 @@ def rank(score: Evaluation, hours: float = 1.0) -> tuple[int, float, float]:
     return len(score.unserved_tasks), max(0.0, 1 - hours / max(score.served_makespan, 1e-9)), score.distance
 
 
-def test_the_best_position_by_the_evaluator(network: ActorCritic) -> None:
+def test_best_position_matches_the_evaluator(network: ActorCritic) -> None:
     """The best position on the way, each scored by `evaluate`, is the one that `play` returns."""
     instances = [paper_like(12, 4, 50, seed) for seed in range(5)]
     board = layout(*instances)
@@ -144,7 +144,7 @@ def test_the_best_position_by_the_evaluator(network: ActorCritic) -> None:
         assert (best.unserved[game].item(), best.shortfall[game].item()) == pytest.approx(rank(score)[:2], abs=1e-5)
 
 
-def test_games_end_side_by_side_as_alone(board: Board, network: ActorCritic) -> None:
+def test_batched_games_end_as_single_ones(board: Board, network: ActorCritic) -> None:
     """Games of different lengths, dropped as they end, find the positions that each finds alone."""
     energy_weights = torch.tensor([0.0, 0.5, 2.0, 8.0])
     board = replace(board, energy_weight=energy_weights)
@@ -167,14 +167,14 @@ def test_never_worse_than_the_start(board: Board, network: ActorCritic, total: b
     assert bests[-1].better_than(bests[0]).any()
 
 
-def test_the_start_is_a_position(board: Board) -> None:
+def test_zero_steps_return_the_start(board: Board) -> None:
     """Without a step the beginning comes back."""
     start = play(ActorCritic(NetworkSize(8, 8, 2)), board, steps=0)
     assert torch.equal(start.slot, board.start)
     assert torch.equal(start.distance, position(board, reset(board)).distance)
 
 
-def test_shortfall_in_total_and_at_the_worst() -> None:
+def test_total_and_maximum_shortfall_match_hand_calculation() -> None:
     """Needs of 4 and 2 with groups of 3 and 3: the shortfall is a quarter at the worst task, a sixth in total."""
     instance = Instance(ability=[3, 3], workload=[4, 2])
     board = replace(layout(instance), start=torch.tensor([[0, 1]]))
@@ -182,7 +182,7 @@ def test_shortfall_in_total_and_at_the_worst() -> None:
     assert (worst, total) == pytest.approx((1 / 4, 1 / 6))
 
 
-def test_better_by_hand() -> None:
+def test_comparison_of_positions_is_lexicographic() -> None:
     """Fewer unserved come first, then less shortfall, then nearer; what single precision cannot tell is equal."""
 
     def best(unserved: int, shortfall: float, distance: float) -> Best:
@@ -195,7 +195,7 @@ def test_better_by_hand() -> None:
     assert not any(bool(one.better_than(here)) or bool(here.better_than(one)) for one in same)
 
 
-def test_play_stops_when_told(board: Board, network: ActorCritic) -> None:
+def test_play_stops_on_request(board: Board, network: ActorCritic) -> None:
     """Told so at once, the beginning comes back; told so later, as many steps as were asked for have been made."""
     assert torch.equal(play(network, board, steps=30, should_stop=lambda: True).slot, board.start)
     asked: list[int] = []

@@ -63,7 +63,7 @@ def by_definition(
     ]
 
 
-def test_advantages_by_hand() -> None:
+def test_advantages_match_hand_calculation() -> None:
     """gamma = 0.5, lambda = 0.5: errors 1 + 2 - 2 = 1, 2 + 4 - 4 = 2 and 0 + 8 - 8 = 0, backwards 0, 2, 1 + 2 / 4."""
     reward, value = torch.tensor([[1.0], [2.0], [0.0]]), torch.tensor([[2.0], [4.0], [8.0]])
     got = advantages(reward, value, torch.ones(3, 1, dtype=torch.bool), torch.tensor([16.0]), 0.5, 0.5)
@@ -71,7 +71,7 @@ def test_advantages_by_hand() -> None:
 
 
 @pytest.mark.parametrize("gae_lambda", [0.0, 0.8, 1.0])
-def test_advantages_by_their_definition(gae_lambda: float) -> None:
+def test_advantages_match_the_definition(gae_lambda: float) -> None:
     """Games of all lengths side by side: those that end, and one that is cut off and counts its last value."""
     generator = torch.Generator().manual_seed(0)
     steps = 6
@@ -90,7 +90,7 @@ def test_advantages_by_their_definition(gae_lambda: float) -> None:
             assert (got[length:, game] == 0).all()
 
 
-def test_nothing_follows_the_end_of_a_game() -> None:
+def test_no_return_beyond_the_end_of_a_game() -> None:
     """The step that ends a game sees neither later rewards nor later values."""
     reward = torch.tensor([[1.0], [2.0], [99.0]])
     value = torch.tensor([[0.5], [0.25], [77.0]])
@@ -99,7 +99,7 @@ def test_nothing_follows_the_end_of_a_game() -> None:
     assert got[:, 0].tolist() == pytest.approx([1 + 2 - 0.5, 2 - 0.25, 0.0])
 
 
-def test_traces_are_cut_as_by_v_trace() -> None:
+def test_traces_are_truncated_as_in_v_trace() -> None:
     """Value and cut advantage make V-trace's target v_s (Espeholt et al. 2018, (1)), with rho and c cut at 1."""
     generator = torch.Generator().manual_seed(1)
     reward, value = torch.randn(2, 5, 1, generator=generator).unbind()
@@ -115,14 +115,14 @@ def test_traces_are_cut_as_by_v_trace() -> None:
 
 
 @pytest.mark.parametrize("rules", ALL_RULES.values(), ids=list(ALL_RULES))
-def test_rewards_add_up_to_the_rise_of_utility(board: Board, network: ActorCritic, rules: Rules) -> None:
+def test_rewards_sum_to_the_increase_of_utility(board: Board, network: ActorCritic, rules: Rules) -> None:
     """The recorded actions lead to a state that is utility more by the rewards."""
     played = play(network, board, 5, rules)
     rise = utility(board, next_state(played, rules), rules) - utility(board, reset(board), rules)
     torch.testing.assert_close(played.reward.sum(0), 5 * rise, atol=1e-4, rtol=1e-4)
 
 
-def test_the_rise_of_utility_is_that_of_the_evaluator(network: ActorCritic) -> None:
+def test_increase_of_utility_matches_the_evaluator(network: ActorCritic) -> None:
     """With energy alone, the reward of a game is the distance saved, as the one scorer measures it."""
     instance = paper_like(8, 3, 36, 0)
     board = layout(instance, hours=1e6, energy_weight=2.0)  # needs of next to nothing: all but energy is met
@@ -135,7 +135,7 @@ def test_the_rise_of_utility_is_that_of_the_evaluator(network: ActorCritic) -> N
 
 
 @pytest.mark.parametrize("rules", ALL_RULES.values(), ids=list(ALL_RULES))
-def test_values_and_probabilities_are_those_of_the_network(board: Board, network: ActorCritic, rules: Rules) -> None:
+def test_values_and_probabilities_match_the_network(board: Board, network: ActorCritic, rules: Rules) -> None:
     """Asked again about the recorded states, the network says what was recorded."""
     played = play(network, board, 5, rules)
     for t, actions in enumerate(played.actions):
@@ -147,7 +147,7 @@ def test_values_and_probabilities_are_those_of_the_network(board: Board, network
         torch.testing.assert_close(scores.value * played.alive[t], played.value[t])
 
 
-def test_a_game_that_is_cut_off_is_not_over(board: Board, network: ActorCritic) -> None:
+def test_truncated_game_is_bootstrapped(board: Board, network: ActorCritic) -> None:
     """After one step the network's value stands for the rest, but for games that have ended."""
     with torch.no_grad():
         network.reserve[-1].bias.fill_(3.0)  # as likely as some 20 bids: about every other game stops at once
@@ -159,7 +159,7 @@ def test_a_game_that_is_cut_off_is_not_over(board: Board, network: ActorCritic) 
     torch.testing.assert_close(played.last_value, torch.where(state.done, 0.0, value))
 
 
-def test_games_that_ended_are_no_longer_counted(board: Board, network: ActorCritic) -> None:
+def test_ended_games_are_not_counted(board: Board, network: ActorCritic) -> None:
     """Decisions and evaluations are those of games still on, and nothing happens in the others."""
     played = play(network, board, 50)
     assert bool(next_state(played, PLANNING).done.all())
@@ -174,7 +174,7 @@ def test_games_that_ended_are_no_longer_counted(board: Board, network: ActorCrit
     assert played.decisions == sum(action >= 0 for action in played.actions.flatten().tolist())
 
 
-def test_play_goes_on_from_a_state(board: Board, network: ActorCritic) -> None:
+def test_play_continues_from_a_state(board: Board, network: ActorCritic) -> None:
     """Two segments with one generator are one long game."""
     one, generator = play(network, board, 4), torch.Generator().manual_seed(0)
     first = collect(network, board, 2, generator, reward_scale=5.0)
@@ -184,7 +184,7 @@ def test_play_goes_on_from_a_state(board: Board, network: ActorCritic) -> None:
     torch.testing.assert_close(torch.cat([first.value, second.value]), one.value)
 
 
-def test_the_seed_decides(board: Board, network: ActorCritic) -> None:
+def test_same_generator_plays_the_same_games(board: Board, network: ActorCritic) -> None:
     """The same generator plays the same games, whatever torch's own generator says; another plays others."""
     one, other = play(network, board, 4), play(network, board, 4, seed=1)
     torch.manual_seed(999)

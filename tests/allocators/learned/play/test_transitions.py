@@ -29,7 +29,7 @@ def played(board: Board, rules: Rules = PLANNING, steps: int = 3) -> Transitions
 
 
 @pytest.mark.parametrize("rules", [PLANNING, Rules(flying=True), Rules(returning=True), Rules(most_moves=2)])
-def test_single_moves_make_up_the_rounds(board: Board, rules: Rules) -> None:
+def test_transitions_form_a_path_of_single_moves(board: Board, rules: Rules) -> None:
     """Each game's transitions are a path from its first state: state after state, one legal bid at a time, and each
     brings the rise of the utility."""
     path = played(board, rules)
@@ -48,13 +48,13 @@ def test_single_moves_make_up_the_rounds(board: Board, rules: Rules) -> None:
             torch.testing.assert_close(states[:-1], getattr(before, field)[rows])
 
 
-def test_agents_that_choose_at_once_are_refused(board: Board) -> None:
+def test_simultaneous_choices_are_refused(board: Board) -> None:
     """What one agent brings is not defined where all choose at once, and the error says so."""
     with pytest.raises(InputError, match="bidding"):
         played(board, Rules(turn=TurnRule.SIMULTANEOUS))
 
 
-def test_exploring_never_stops_at_once(board: Board) -> None:
+def test_exploration_never_stops_at_once(board: Board) -> None:
     """A network that would stop at once explores all the same."""
     network = ActorCritic()
     with torch.no_grad():
@@ -64,7 +64,7 @@ def test_exploring_never_stops_at_once(board: Board) -> None:
     assert len(play(network, board, 1, generator, PLANNING, 0.1, exploring=1.0).transitions.action) == 3
 
 
-def test_gains_are_scores_above_the_reserve(board: Board) -> None:
+def test_gains_are_scores_minus_the_reserve(board: Board) -> None:
     """Closed bids have none, and stopping has 0."""
     state = reset(board)
     bids, reserve = torch.full(board.shape, 3.0), torch.tensor([1.0, 2.0, 5.0])
@@ -75,7 +75,7 @@ def test_gains_are_scores_above_the_reserve(board: Board) -> None:
     assert [set(row[open_].tolist()) for row, open_ in zip(got[:, :-1], opened, strict=True)] == [{2.0}, {1.0}, {-2.0}]
 
 
-def test_memory_forgets_the_oldest_board(board: Board) -> None:
+def test_oldest_board_is_dropped_first(board: Board) -> None:
     """No more than the capacity is kept, and what was kept last is there."""
     first, second = played(board, steps=1), played(board, steps=2)
     memory = TransitionMemory(len(first.action) + len(second.action) - 1)
@@ -84,7 +84,7 @@ def test_memory_forgets_the_oldest_board(board: Board) -> None:
     assert memory.kept == [second]
 
 
-def test_every_transition_is_drawn_as_often(board: Board) -> None:
+def test_transitions_are_drawn_uniformly(board: Board) -> None:
     """Whatever the sizes of the boards, each transition has the same chance."""
     small = played(board, steps=1)
     large = played(probe("pairing").board, steps=1)

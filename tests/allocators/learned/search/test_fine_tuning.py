@@ -50,7 +50,9 @@ def weights(networks: list[ActorCritic]) -> torch.Tensor:
     return torch.cat([weight.detach().flatten() for network in networks for weight in network.parameters()])
 
 
-def test_when_learning_is_due(networks: list[ActorCritic], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_fine_tuning_starts_and_ends_in_its_share_of_time(
+    networks: list[ActorCritic], monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Not before three seconds, then until its share of the time is spent; never where runs must repeat."""
     clock = [0.0]
     monkeypatch.setattr(Search, "elapsed_s", property(lambda self: clock[0]))
@@ -62,7 +64,7 @@ def test_when_learning_is_due(networks: list[ActorCritic], monkeypatch: pytest.M
     assert not FineTuning(search(None, 10), networks).is_due()
 
 
-def test_shipped_networks_stay_as_they_are(networks: list[ActorCritic], regions: Regions) -> None:
+def test_shipped_networks_are_not_modified(networks: list[ActorCritic], regions: Regions) -> None:
     """Lessons change copies, member by member; the networks of the policy serve the next run as before."""
     before = weights(networks).clone()
     tuning = FineTuning(search(), networks, FEW)
@@ -76,7 +78,7 @@ def test_shipped_networks_stay_as_they_are(networks: list[ActorCritic], regions:
     assert tuning.spent_s > 0
 
 
-def test_generations_follow_each_other(networks: list[ActorCritic], regions: Regions) -> None:
+def test_population_breeds_after_enough_jobs(networks: list[ActorCritic], regions: Regions) -> None:
     """After some lessons of each member the population breeds; all weights stay finite, and the seed decides."""
     ends = []
     for seed in (0, 0, 1):
@@ -91,7 +93,7 @@ def test_generations_follow_each_other(networks: list[ActorCritic], regions: Reg
 
 
 @pytest.mark.parametrize("rewards", list(permutations((1.0, 2.0, 3.0))))
-def test_the_fittest_survive_a_generation(regions: Regions, rewards: tuple[float, ...]) -> None:
+def test_elite_survives_a_generation(regions: Regions, rewards: tuple[float, ...]) -> None:
     """Whatever the order of their fitness, the elite pass unchanged, weights and optimiser together."""
     torch.manual_seed(0)
     shipped = [ActorCritic(NetworkSize(8, 8, 2)).requires_grad_(False) for _ in rewards]
@@ -113,7 +115,7 @@ def moments(member: Ppo) -> torch.Tensor:
     return torch.cat([state["exp_avg"].flatten() for state in member.optimiser.state.values()]).clone()
 
 
-def test_games_begin_at_the_nearest_task_or_where_the_plan_is(regions: Regions) -> None:
+def test_games_start_at_the_nearest_task_or_in_the_plan(regions: Regions) -> None:
     """Some agents begin at the nearest task, others where the plan has them, with energy weights in the range."""
     games = _RegionGames(regions, FineTuningParameters(games=200))
     board = games.draw(np.random.default_rng(0), 0.0)
@@ -129,7 +131,7 @@ def test_games_begin_at_the_nearest_task_or_where_the_plan_is(regions: Regions) 
     assert few.draw(np.random.default_rng(0), 0.0).shape[0] == 3
 
 
-def test_the_planner_plays_by_what_was_learned(networks: list[ActorCritic], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_planner_uses_fine_tuned_networks(networks: list[ActorCritic], monkeypatch: pytest.MonkeyPatch) -> None:
     """Where learning is due, the planner's networks are those that learned."""
     run = search(None, 3)
     tuning = FineTuning(run, networks, FEW)

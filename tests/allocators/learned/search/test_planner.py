@@ -67,7 +67,7 @@ def solved(
     return result.evaluation
 
 
-def test_regions_hold_all_agents_of_their_tasks(network: ActorCritic) -> None:
+def test_regions_contain_all_agents_of_their_tasks(network: ActorCritic) -> None:
     """Each region has the agents of its tasks and some of the idle; nobody is in two."""
     instance = paper_like(40, 9, 170, 1)
     one = planner(network, instance)
@@ -82,7 +82,7 @@ def test_regions_hold_all_agents_of_their_tasks(network: ActorCritic) -> None:
         assert set(np.flatnonzero(one.plan == IDLE).tolist()) <= set(together.tolist())
 
 
-def test_a_sweep_leaves_all_other_agents_alone(network: ActorCritic) -> None:
+def test_sweep_moves_only_agents_of_accepted_regions(network: ActorCritic) -> None:
     """Agents of regions that were not accepted, and those in no region, stay where they are."""
     instance = paper_like(40, 9, 170, 1)
     one = planner(network, instance)
@@ -129,7 +129,7 @@ def test_never_worse_than_the_start(network: ActorCritic, objective: Objective) 
 
 
 @pytest.mark.parametrize("seed", range(30))
-def test_tiny_instances_by_brute_force(network: ActorCritic, seed: int) -> None:
+def test_tiny_instances_are_feasible_and_above_the_optimum(network: ActorCritic, seed: int) -> None:
     """On instances of every kind the plan is allowed, serves all that can be served, and is not below the optimum."""
     instance = tiny_instance(seed)
     search = planned(network, instance, objective=ENERGY, iterations=2)
@@ -152,7 +152,7 @@ def test_most_tiny_instances_are_solved(network: ActorCritic) -> None:
     assert hit >= 16
 
 
-def test_first_target_is_the_bound_and_then_half_way(network: ActorCritic) -> None:
+def test_targets_start_at_the_bound_and_are_bisected(network: ActorCritic) -> None:
     """Targets: the bound; without progress, halfway to the makespan reached; nearer the bound when one is reached."""
     instance = Instance(ability=[3, 3, 3], workload=[4, 5])  # the bound of 1 cannot be met: 5 / 3 or 4 / 3 at best
     one = planner(network, instance)
@@ -175,7 +175,7 @@ def test_first_target_is_the_bound_and_then_half_way(network: ActorCritic) -> No
     assert one.target.failed == pytest.approx((bound + 4 / 3) / 2)
 
 
-def test_energy_counts_once_the_bound_is_met_or_time_is_short(network: ActorCritic) -> None:
+def test_energy_counts_at_the_bound_or_late_in_the_run(network: ActorCritic) -> None:
     """With energy in the objective the target becomes the makespan reached, at the bound, or late in the run."""
     instance = Instance(ability=[3, 3, 3], workload=[4, 5])
     early, late = (planner(network, instance, ENERGY, iterations=10) for _ in range(2))
@@ -191,7 +191,7 @@ def test_energy_counts_once_the_bound_is_met_or_time_is_short(network: ActorCrit
     assert met.target.hours == 1.0
 
 
-def test_bounds_that_cannot_be_met_do_not_hold_it_up(network: ActorCritic) -> None:
+def test_optimum_is_found_with_an_unreachable_bound(network: ActorCritic) -> None:
     """Where the bound is out of reach, bisection on the target finds the optimum all the same."""
     instance = Instance(ability=[5, 5, 5, 4, 4], workload=[9, 8, 6], agent_position=np.zeros((5, 2)))
     best = brute_force(instance)
@@ -203,7 +203,7 @@ def test_bounds_that_cannot_be_met_do_not_hold_it_up(network: ActorCritic) -> No
     assert one.search.best.evaluation.makespan == pytest.approx(best.makespan)
 
 
-def test_tasks_that_nobody_can_do_do_not_count(network: ActorCritic) -> None:
+def test_unservable_tasks_do_not_count(network: ActorCritic) -> None:
     """A huge task out of reach, and more tasks than agents, spoil neither bound nor search."""
     far = Instance(
         ability=[1] * 10,
@@ -219,7 +219,7 @@ def test_tasks_that_nobody_can_do_do_not_count(network: ActorCritic) -> None:
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_of_tasks_that_cannot_all_be_served_the_least_work_is_done(network: ActorCritic, seed: int) -> None:
+def test_smallest_tasks_are_served_in_a_shortage(network: ActorCritic, seed: int) -> None:
     """With more tasks than agents everywhere in reach, the makespan is that of brute force."""
     rng = np.random.default_rng(seed)
     instance = Instance(ability=rng.integers(1, 6, 3), workload=rng.integers(1, 30, 5))
@@ -227,7 +227,7 @@ def test_of_tasks_that_cannot_all_be_served_the_least_work_is_done(network: Acto
     assert (len(got.unserved_tasks), got.served_makespan) == (best.unserved, pytest.approx(best.makespan))
 
 
-def test_a_task_that_needs_most_agents_gets_them_in_the_first_game(network: ActorCritic) -> None:
+def test_task_that_needs_most_agents_gets_them_in_the_first_game(network: ActorCritic) -> None:
     """One agent joins a task in a round: a game goes on as long as the largest task takes."""
     instance = Instance(ability=np.ones(60), workload=[48.0, *[2.0] * 6], start_task=np.arange(60) % 7)
     one = planner(network, instance)
@@ -267,7 +267,7 @@ def test_games_on_a_region_are_bounded(
     assert {count for games in on_regions for count in games} == {games}
 
 
-def test_targets_approached_too_slowly_are_given_up(network: ActorCritic) -> None:
+def test_targets_approached_too_slowly_are_abandoned(network: ActorCritic) -> None:
     """A target is given up for one halfway where, after a share of the budget, most of the shortfall is left."""
     instance = paper_like(40, 8, 170, 0)
     one = planner(network, instance, iterations=100)
@@ -288,7 +288,7 @@ def test_targets_approached_too_slowly_are_given_up(network: ActorCritic) -> Non
     assert target.hours > first
 
 
-def test_a_small_shortfall_does_not_end_a_target(network: ActorCritic) -> None:
+def test_small_shortfall_does_not_end_a_target(network: ActorCritic) -> None:
     """A shortfall of less than a mean ability ends no target, and stagnation is counted after some sweeps only."""
     one = planner(network, paper_like(40, 8, 170, 0), iterations=100)
     one.play_whole(1.0)
@@ -320,7 +320,7 @@ def test_small_shortfalls_of_many_tasks_end_a_target(network: ActorCritic) -> No
     assert slow == [False, True]
 
 
-def test_nothing_to_serve_ends_at_once(network: ActorCritic) -> None:
+def test_run_without_work_ends_at_once(network: ActorCritic) -> None:
     """Where there is no work there is an answer, and no game on regions."""
     instance = Instance(ability=[1, 1], workload=[0], agent_position=[[0, 0]] * 2, task_position=[[9, 9]])
     search = planned(network, instance, iterations=None, time_limit_s=60.0)
@@ -328,7 +328,7 @@ def test_nothing_to_serve_ends_at_once(network: ActorCritic) -> None:
     assert search.iteration == 0
 
 
-def test_slack_and_limit_buy_energy(network: ActorCritic) -> None:
+def test_slack_and_limit_save_energy(network: ActorCritic) -> None:
     """The more time a plan may take, the less it flies; a limit that is given is the target."""
     instance = paper_like(24, 5, 100, 3)
     spent = []
@@ -344,7 +344,7 @@ def test_slack_and_limit_buy_energy(network: ActorCritic) -> None:
 
 
 @pytest.mark.parametrize("objective", OBJECTIVES)
-def test_same_seed_same_answer(network: ActorCritic, objective: Objective) -> None:
+def test_same_seed_gives_same_answer(network: ActorCritic, objective: Objective) -> None:
     """Counted in sweeps, answers agree move by move with one thread and with two; another seed's differ."""
     instance = random_instance(Family(agents=24, tasks=5, starts="own", speed=(0.5, 2.0)), 1)
     runs = [planned(network, instance, objective=objective, threads=threads, seed=4) for threads in (1, 1, 2)]
@@ -354,7 +354,7 @@ def test_same_seed_same_answer(network: ActorCritic, objective: Objective) -> No
     assert traces[0] != traces[3]
 
 
-def test_stops_in_time(network: ActorCritic) -> None:
+def test_planner_stops_in_time(network: ActorCritic) -> None:
     """Sweeps and the games in them end when time is up; with no time at all there is still an answer."""
     instance = paper_like(100, 20, 400, 0)
     for limit in (0.0, 0.5):
@@ -368,14 +368,14 @@ def test_stops_in_time(network: ActorCritic) -> None:
 
 @pytest.mark.parametrize("objective", OBJECTIVES)
 @pytest.mark.parametrize("name", list(EXTREMES))
-def test_ends_of_what_is_valid(network: ActorCritic, name: str, objective: Objective) -> None:
+def test_extreme_instances_give_feasible_plans(network: ActorCritic, name: str, objective: Objective) -> None:
     """Huge and tiny numbers, no positions, nobody able, nothing to do: there is an allowed answer."""
     search = planned(network, EXTREMES[name], objective=objective)
     assert search.best is not None
     assert search.best.evaluation.violations == ()
 
 
-def test_idle_agents_are_put_to_work(network: ActorCritic) -> None:
+def test_idle_agents_are_assigned(network: ActorCritic) -> None:
     """Agents that begin idle, or are left idle by a start, join where they are needed."""
     instance = Instance(ability=np.ones(12), workload=np.full(3, 4.0), task_position=np.eye(3))
     start = Allocation(np.array([0, 1, 2, *[IDLE] * 9]))
@@ -401,7 +401,7 @@ def test_all_networks_are_used(network: ActorCritic, monkeypatch: pytest.MonkeyP
     assert set(asked) == {0, 1, 2}
 
 
-def test_with_finite_speeds_the_target_allows_for_flights() -> None:
+def test_target_allows_for_flights_with_finite_speeds() -> None:
     """Two agents of 1 per hour fly 1 h and 3 h to work of 2 in all: divided without remainder, it ends after 3 h."""
     instance = Instance(
         ability=[1.0, 1.0],

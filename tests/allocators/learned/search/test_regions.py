@@ -21,7 +21,7 @@ def test_tasks_are_partitioned(seed: int) -> None:
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_regions_are_for_shortfalls(seed: int) -> None:
+def test_regions_are_built_around_shortfalls(seed: int) -> None:
     """Where there are shortfalls, each region has one, and a surplus while there is any left."""
     rng = np.random.default_rng(seed)
     m, size = int(rng.integers(4, 30)), int(rng.integers(2, 5))
@@ -49,7 +49,7 @@ def test_shortfall_and_surplus_are_in_one_region() -> None:
     assert set(partition(place, surplus, 2, np.random.default_rng(0))[0].tolist()) in ({0, 7}, {0, 8}, {0, 9})
 
 
-def test_regions_are_of_near_tasks() -> None:
+def test_regions_contain_nearby_tasks() -> None:
     """Two far clusters of four are never mixed."""
     place = np.repeat([[0.0, 0, 0], [9.0, 0, 0]], 4, axis=0) + 0.1 * np.random.default_rng(0).random((8, 3))
     for seed in range(20):
@@ -58,7 +58,7 @@ def test_regions_are_of_near_tasks() -> None:
 
 
 @pytest.mark.parametrize("scale", [1e-300, 1e60])
-def test_every_position_is_valid(scale: float) -> None:
+def test_regions_are_disjoint_for_any_positions(scale: float) -> None:
     """Unknown, huge and tiny positions make regions that share no task."""
     rng = np.random.default_rng(0)
     place = scale * rng.uniform(-1, 1, (12, 3))
@@ -95,7 +95,7 @@ def test_regions_share_no_task_of_a_path() -> None:
         assert len(np.unique(regions)) == regions.size
 
 
-def test_the_graph_counts_for_shortfalls_alone() -> None:
+def test_graph_is_used_only_for_shortfalls() -> None:
     """Without a shortfall, and for tasks without edges, regions are of neighbours in space."""
     place = np.repeat([[0.0, 0, 0], [9.0, 0, 0]], 2, axis=0)
     graph = edges((0, 3), (3, 0), (1, 2), (2, 1), m=4)
@@ -105,7 +105,7 @@ def test_the_graph_counts_for_shortfalls_alone() -> None:
     assert partition(place, np.array([0.0, 0, -1, 0]), 2, np.random.default_rng(0), graph=alone).tolist() == [[2, 3]]
 
 
-def test_edges_lead_to_agents_that_could_come() -> None:
+def test_edges_lead_to_agents_that_can_take_the_task() -> None:
     """An edge leads from a task to those with an agent that may work at it; agents that are idle or there make none."""
     instance = Instance(
         ability=[1, 1, 1, 1],

@@ -32,7 +32,7 @@ def test_every_family_gives_playable_games(family: str) -> None:
         assert (board.legal[:, :, :-1].sum((1, 2)) > 0).all()
 
 
-def test_the_same_generator_draws_the_same_games() -> None:
+def test_same_generator_draws_the_same_games() -> None:
     """A board is a function of the generator and the progress."""
     one, two, other = drawn(SMALL, 7), drawn(SMALL, 7), drawn(SMALL, 8)
     assert all(torch.equal(getattr(one, field.name), getattr(two, field.name)) for field in fields(Board))
@@ -48,7 +48,7 @@ def test_sizes_grow_with_progress() -> None:
     assert SMALL.initial_tasks[1] < max(late) <= SMALL.tasks[1]
 
 
-def test_boards_are_about_equally_large() -> None:
+def test_boards_have_similar_sizes() -> None:
     """Many small games or few large ones: pairs stay near the limit, and agents below theirs."""
     for seed in range(15):
         games, n, _ = (board := drawn(Curriculum(families=("paper",)), seed)).shape
@@ -57,7 +57,7 @@ def test_boards_are_about_equally_large() -> None:
         assert games * n * board.places <= 12_000 or games == 8
 
 
-def test_energy_weights_and_targets_spread() -> None:
+def test_energy_weights_and_targets_have_their_distributions() -> None:
     """Energy weights are log-uniform; a share of the games have targets beyond the bound, with ability to spare."""
     curriculum = Curriculum(
         families=("paper",), max_pairs=3000, energy_weight=(0.2, 3.0), relaxed_fraction=0.3, max_relaxation=1.3
@@ -73,7 +73,7 @@ def test_energy_weights_and_targets_spread() -> None:
     assert load.min() > 1 / 1.31
 
 
-def test_travel_costs_ability() -> None:
+def test_travel_reduces_ability() -> None:
     """At finite speeds agents bring from a half to nearly all of their ability, less the farther they fly."""
     board = drawn(replace(SMALL, families=("travel",), relaxed_fraction=0.0))
     share = (board.contribution / board.ability[..., None])[:, :, :-1]
@@ -81,7 +81,7 @@ def test_travel_costs_ability() -> None:
     assert share.min() < 0.9
 
 
-def test_the_reference_is_the_best_bound() -> None:
+def test_reference_makespan_is_the_best_bound() -> None:
     """With short communication ranges the bound of the linear programme may be the higher one."""
     rng = np.random.default_rng(0)
     instances = [draw_instance("short-range", 20, 5, seed, rng) for seed in range(6)]
@@ -92,7 +92,7 @@ def test_the_reference_is_the_best_bound() -> None:
     assert references != bounds
 
 
-def test_own_instances_are_played_in_place_of_drawn_ones() -> None:
+def test_own_instances_replace_drawn_ones() -> None:
     """A board holds copies of those instances that are equally large, with their own energy weights."""
     given = tuple(with_reference([paper_like(12, 3, 50, seed) for seed in range(3)] + [paper_like(9, 2, 40, 5)]))
     curriculum = replace(SMALL, instances=given, relaxed_fraction=0.0)
@@ -102,14 +102,14 @@ def test_own_instances_are_played_in_place_of_drawn_ones() -> None:
     assert len(board.energy_weight.unique()) == len(board.energy_weight)
 
 
-def test_own_instances_may_be_large() -> None:
+def test_large_own_instances_use_sparse_candidates() -> None:
     """Where one game alone has more pairs than a board should, agents bid for near tasks only."""
     board = drawn(replace(SMALL, instances=tuple(with_reference([paper_like(100, 20, 400, 1)]))))
     assert board.shape[0] == 1
     assert board.shape[2] < 21
 
 
-def test_training_seeds_are_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_training_seeds_are_in_their_reserved_range(monkeypatch: pytest.MonkeyPatch) -> None:
     """Every instance is drawn with a seed from 10^9 to below 2 * 10^9, where nobody else draws."""
     seeds = []
     module = "alloc.allocators.learned.training.families"
@@ -121,7 +121,7 @@ def test_training_seeds_are_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
     assert all(10**9 <= seed < 2 * 10**9 for seed in seeds)
 
 
-def test_longer_games_for_more_agents() -> None:
+def test_game_length_grows_with_agents() -> None:
     """A game has rounds enough for its agents."""
     few, many = (drawn(replace(SMALL, instances=tuple(with_reference([paper_like(n, 3, 4 * n, 0)])))) for n in (12, 72))
     assert SMALL.max_steps(few) < SMALL.max_steps(many)

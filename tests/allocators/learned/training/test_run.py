@@ -25,7 +25,7 @@ INSTANCES = [paper_like(8, 2, 35, seed) for seed in range(2)]
 QUICK: dict[str, Any] = {"instances": INSTANCES, "decisions": 150, "parameters": {"update_epochs": 1}}
 
 
-def test_it_trains_what_the_command_trains(tmp_path: Path) -> None:
+def test_library_and_command_train_the_same_policy(tmp_path: Path) -> None:
     """The policy file is the command's to the byte, the report is returned, and a solver takes the policy."""
     (tmp_path / "mine").mkdir()
     for number, instance in enumerate(INSTANCES):
@@ -41,7 +41,7 @@ def test_it_trains_what_the_command_trains(tmp_path: Path) -> None:
     assert result.allocation is not None
 
 
-def test_it_can_be_watched_stopped_and_resumed(tmp_path: Path) -> None:
+def test_training_can_be_observed_stopped_and_resumed(tmp_path: Path) -> None:
     """Callbacks see the start and every generation; a stop keeps complete generations, which resuming continues."""
     seen: list[int] = []
     options = {**QUICK, "iterations": 3, "on_report": lambda report: seen.append(report.generation)}
@@ -55,7 +55,7 @@ def test_it_can_be_watched_stopped_and_resumed(tmp_path: Path) -> None:
     assert whole.generation == 3
 
 
-def test_a_policy_begins_another(tmp_path: Path) -> None:
+def test_policy_can_initialise_another_method(tmp_path: Path) -> None:
     """With `init` another method starts from the networks of a policy, and its metadata says what it was trained by."""
     train("ppo", tmp_path / "p", iterations=1, **QUICK)
     trainer = train("gappo", tmp_path / "g", iterations=1, init=tmp_path / "p", population=2, **QUICK)
@@ -88,7 +88,7 @@ def test_a_policy_begins_another(tmp_path: Path) -> None:
         ({"turn": "both"}, "turn: must be one of bidding, simultaneous"),
     ],
 )
-def test_mistakes_are_told_before_anything_is_written(
+def test_wrong_arguments_are_refused_before_anything_is_written(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, options: dict[str, Any], message: str
 ) -> None:
     """Whatever cannot work is an `InputError` that names the parameter or the file."""
@@ -99,7 +99,7 @@ def test_mistakes_are_told_before_anything_is_written(
     assert [path.name for path in tmp_path.iterdir()] == ["taken"]
 
 
-def test_a_run_is_not_overwritten(tmp_path: Path) -> None:
+def test_run_is_not_overwritten(tmp_path: Path) -> None:
     """A second run of the same name is refused while the first has generations, and begins anew where it has none."""
     train("ppo", tmp_path / "p", iterations=0, **QUICK)
     train("ppo", tmp_path / "p", iterations=1, **QUICK)
@@ -110,7 +110,7 @@ def test_a_run_is_not_overwritten(tmp_path: Path) -> None:
         train("ppo", tmp_path / "p", iterations=1, **QUICK)
 
 
-def test_an_engine_that_gives_up_is_a_training_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_failing_engine_is_a_training_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The message says what is kept, and the cause is chained."""
 
     def give_up(*_: object) -> None:
@@ -123,7 +123,7 @@ def test_an_engine_that_gives_up_is_a_training_error(tmp_path: Path, monkeypatch
 
 
 @pytest.mark.slow
-def test_members_have_the_threads_of_the_engine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_members_use_the_threads_of_the_engine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Torch computes with as many threads as the engine grants to an item."""
     import torch
 

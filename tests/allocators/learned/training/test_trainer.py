@@ -81,7 +81,7 @@ def planned(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
     ],
     ids=[*METHODS, "rules of the paper"],
 )
-def test_a_resumed_run_goes_on_as_if_nothing_had_happened(tmp_path: Path, changes: dict[str, Any]) -> None:
+def test_resumed_run_continues_identically(tmp_path: Path, changes: dict[str, Any]) -> None:
     """Two generations at once, and one and one with a checkpoint between, give the same figures and weights."""
     limits = Limits(steps=1000)
     whole, first, second = (trainer(**changes) for _ in range(3))
@@ -96,7 +96,7 @@ def test_a_resumed_run_goes_on_as_if_nothing_had_happened(tmp_path: Path, change
 
 
 @pytest.mark.slow
-def test_processes_train_the_same() -> None:
+def test_processes_train_identically() -> None:
     """Members that learn in other processes learn the same to the last bit."""
     here, there = trainer(), trainer()
     with ProcessEngine(2) as engine:
@@ -107,7 +107,7 @@ def test_processes_train_the_same() -> None:
     assert torch.equal(weights(here), weights(there))
 
 
-def test_seeds_matter() -> None:
+def test_seeds_determine_weights_and_jobs() -> None:
     """Another seed begins with other weights, and every job has its own seed."""
     one, other = trainer(1), trainer(2)
     assert not torch.equal(weights(one), weights(other))
@@ -117,7 +117,7 @@ def test_seeds_matter() -> None:
     assert len(seeds) == 6
 
 
-def test_jobs_change_nothing_but_their_own_learner() -> None:
+def test_jobs_modify_only_their_own_learner() -> None:
     """A generation that is dropped leaves weights and optimisers as they were, though members were trained in it."""
     run, undisturbed = trainer(), trainer()
     for one in (run, undisturbed):
@@ -148,7 +148,7 @@ def test_train_writes_policy_checkpoint_and_log(paths: RunFiles) -> None:
     assert lines[0].startswith("generation,decisions,evaluations,cost,unserved,time")
 
 
-def test_the_log_and_the_policy_are_put_right(paths: RunFiles) -> None:
+def test_log_and_policy_are_completed_on_resume(paths: RunFiles) -> None:
     """A run that was killed after its checkpoint, before the other files, writes them when it is resumed."""
     run = trainer(1)
     run_training(run, paths, limits=Limits(iterations=2))
@@ -179,7 +179,7 @@ def test_the_best_networks_are_kept(paths: RunFiles, planned: Callable[..., None
     assert all(torch.equal(weight, second[name]) for name, weight in kept.state_dict().items())
 
 
-def test_patience_ends_a_run_that_gets_no_better(paths: RunFiles, planned: Callable[..., None]) -> None:
+def test_patience_ends_a_run_without_improvement(paths: RunFiles, planned: Callable[..., None]) -> None:
     """Two generations in a row without better networks end it, one does not."""
     planned(0.5, 0.6, 0.4, 0.4, 0.5, 0.1)
     run = trainer(population=1, method="ppo")
@@ -187,7 +187,7 @@ def test_patience_ends_a_run_that_gets_no_better(paths: RunFiles, planned: Calla
     assert [report.cost for report in run.history] == [0.5, 0.6, 0.4, 0.4, 0.5]
 
 
-def test_steps_are_those_of_all_members_together(paths: RunFiles) -> None:
+def test_steps_are_summed_over_members(paths: RunFiles) -> None:
     """Training ends with the update that reaches the steps, and the last jobs are shorter."""
     run = trainer()
     run_training(run, paths, limits=Limits(steps=400))
@@ -196,7 +196,7 @@ def test_steps_are_those_of_all_members_together(paths: RunFiles) -> None:
     assert run._job(0, Limits(steps=run.history[-1].decisions + 6)).decisions == 2
 
 
-def test_progress_follows_the_first_limit_given() -> None:
+def test_progress_follows_the_first_given_limit() -> None:
     """Schedules follow the steps; without them the generations, and the clock alone only if there is nothing else."""
     run = trainer()
     assert run.progress(Limits()) == run.progress(Limits(steps=9)) == 0
@@ -209,7 +209,7 @@ def test_progress_follows_the_first_limit_given() -> None:
     assert run.is_over(Limits(minutes=0))
 
 
-def test_members_begin_with_given_weights() -> None:
+def test_members_start_from_given_weights() -> None:
     """The networks of a policy file are dealt out in turn; without any, all members begin alike."""
     given = [Ppo(TINY.network, seed=seed).policy.state_dict() for seed in (8, 9)]
     run = Trainer(TINY, 0, BOARDS, given)
@@ -219,7 +219,7 @@ def test_members_begin_with_given_weights() -> None:
     assert all(torch.equal(alike[0]["network"][name], weight) for name, weight in alike[2]["network"].items())
 
 
-def test_cost_and_decisions_of_all_members_count(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_reports_sum_over_all_members(monkeypatch: pytest.MonkeyPatch) -> None:
     """A report adds up what the members did, and fitness (12) gets their network evaluations."""
 
     def train_on(self: Ppo, job: TrainingJob) -> TrainingStats:
@@ -236,7 +236,7 @@ def test_cost_and_decisions_of_all_members_count(monkeypatch: pytest.MonkeyPatch
 
 
 @pytest.mark.parametrize("content", [None, b"", b"not a checkpoint"])
-def test_bad_checkpoints(tmp_path: Path, content: bytes | None) -> None:
+def test_missing_and_broken_checkpoints_are_refused(tmp_path: Path, content: bytes | None) -> None:
     """A missing or broken checkpoint is told in one line."""
     if content is not None:
         (tmp_path / "checkpoint").write_bytes(content)
@@ -245,7 +245,7 @@ def test_bad_checkpoints(tmp_path: Path, content: bytes | None) -> None:
     assert "\n" not in str(caught.value)
 
 
-def test_damaged_checkpoints(tmp_path: Path) -> None:
+def test_damaged_checkpoints_are_refused(tmp_path: Path) -> None:
     """A checkpoint cut short, or with a hole, is told in plain words, not in those of torch."""
     path = tmp_path / "checkpoint"
     trainer().save(path)
@@ -257,7 +257,7 @@ def test_damaged_checkpoints(tmp_path: Path) -> None:
         assert caught.value.message == "is no checkpoint, or is damaged; name another checkpoint, or remove it"
 
 
-def test_checkpoints_of_other_versions(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_checkpoints_of_other_versions_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """They are not gone on with, but what they hold is known."""
     monkeypatch.setattr(checkpoint, "CHECKPOINT_FORMAT", "alloc-checkpoint/2")
     run = trainer()
@@ -288,7 +288,7 @@ def test_checkpoints_of_other_runs_are_refused(tmp_path: Path, changes: dict[str
         trainer(**changes).resume(tmp_path / "checkpoint")
 
 
-def test_descriptions_keep_the_names_of_their_format(tmp_path: Path) -> None:
+def test_metadata_keep_the_names_of_their_format(tmp_path: Path) -> None:
     """Checkpoints name parameters as all of this format have, and errors name them as the program does."""
     trainer().save(tmp_path / "checkpoint")
     stored = torch.load(tmp_path / "checkpoint", weights_only=True)["description"]
@@ -305,7 +305,7 @@ def test_descriptions_keep_the_names_of_their_format(tmp_path: Path) -> None:
         trainer(learner=replace(TINY.learner, clip_coef=0.3)).resume(tmp_path / "checkpoint")
 
 
-def test_files_that_cannot_be_read_are_not_called_damaged(tmp_path, monkeypatch):
+def test_unreadable_files_are_not_reported_as_damaged(tmp_path, monkeypatch):
     """No memory, no permission and a damaged file are three things: only the last is advised to be removed."""
     path = tmp_path / "run.checkpoint"
     trainer().save(path)
@@ -330,7 +330,7 @@ def _raising(error):
     return fail
 
 
-def test_ddpg_is_not_bred():
+def test_ddpg_has_no_population():
     """Breeding needs single networks, which is told before anything is trained."""
     with pytest.raises(InputError, match="population: breeding"):
         TrainingParameters(method="ddpg", population=2)

@@ -22,7 +22,7 @@ TINY = TrainingParameters("ppo", 1, 20, NetworkSize(4, 4, 1), method_parameters(
 
 
 @pytest.mark.needs("optuna")
-def test_a_study_begins_with_the_defaults_and_is_gone_on_with(tmp_path: Path) -> None:
+def test_study_starts_with_the_defaults_and_is_resumed(tmp_path: Path) -> None:
     """Two trials, then one more in another process's place, are three; the first is what a user gets untuned."""
     path = tmp_path / "study.db"
     tune(open_study(path, "ppo", 0), TINY, 2, Limits(iterations=1), boards=BOARDS)
@@ -35,7 +35,7 @@ def test_a_study_begins_with_the_defaults_and_is_gone_on_with(tmp_path: Path) ->
 
 
 @pytest.mark.needs("optuna")
-def test_hopeless_trials_end_early(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_poor_trials_are_pruned(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A trial that does worse than most before it is pruned."""
     costs = iter([0.1] * 15 + [0.9] * 3)
     monkeypatch.setattr(module, "validate", lambda *_: Validation(next(costs), 0.0, 1.0, 0.1, 1.0, 0.0))
@@ -45,7 +45,7 @@ def test_hopeless_trials_end_early(tmp_path: Path, monkeypatch: pytest.MonkeyPat
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_every_method_has_something_to_tune(method: str) -> None:
+def test_search_spaces_surround_the_defaults(method: str) -> None:
     """What is tuned lies around the defaults of every method."""
 
     class Lowest:
@@ -60,7 +60,7 @@ def test_every_method_has_something_to_tune(method: str) -> None:
     assert {"learning_rate", "gamma"} <= got.keys() <= LOG_SPACES.keys() | UNIFORM_SPACES.keys()
 
 
-def test_without_optuna_the_extra_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_missing_optuna_names_the_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Whoever tunes is told what to install."""
     monkeypatch.setitem(sys.modules, "optuna", None)
     with pytest.raises(InputError, match=r"alloc-mrta\[tune\]"):
@@ -68,7 +68,7 @@ def test_without_optuna_the_extra_is_named(tmp_path: Path, monkeypatch: pytest.M
 
 
 @pytest.mark.needs("optuna")
-def test_other_files_are_no_studies(tmp_path: Path) -> None:
+def test_other_files_are_refused(tmp_path: Path) -> None:
     """A file that is no SQLite database is told in one line."""
     (tmp_path / "study.db").write_text("no database, and long enough to be seen as such" * 10)
     with pytest.raises(InputError, match="is not a study"):

@@ -29,7 +29,7 @@ def network() -> ActorCritic:
     return ActorCritic(NetworkSize(8, 8, 2))
 
 
-def test_time_is_that_of_the_best_plan_met(network: ActorCritic) -> None:
+def test_makespan_and_cost_match_the_best_plan_of_the_game(network: ActorCritic) -> None:
     """T, distance and cost agree with the evaluator's of every plan along the game, at its cheapest."""
     instance = paper_like(10, 3, 44, 1)
     curriculum, (board,) = games_on([instance], Curriculum())
@@ -48,7 +48,7 @@ def test_time_is_that_of_the_best_plan_met(network: ActorCritic) -> None:
     assert got.others_time == got.time
 
 
-def test_a_bad_game_does_not_decide(network: ActorCritic) -> None:
+def test_cost_of_a_bad_game_is_capped(network: ActorCritic) -> None:
     """However far from its reference a makespan is, it costs no more than an unserved task."""
     instances = [paper_like(10, 3, 44, 1)] * 2
     references = [one.reference_h for one in with_reference(instances)]
@@ -58,7 +58,7 @@ def test_a_bad_game_does_not_decide(network: ActorCritic) -> None:
     assert 0 < costs[1] - costs[0] < 0.6
 
 
-def test_unserved_tasks_are_their_part_of_the_cost(network: ActorCritic) -> None:
+def test_unserved_tasks_are_reported_as_part_of_the_cost(network: ActorCritic) -> None:
     """What nobody can serve is told, as a mean over boards as the cost is; the rest of the cost is small."""
     served, unserved = paper_like(10, 3, 44, 1), Instance(ability=[1], workload=[1, 1, 1], allowed_tasks=[[]])
     curriculum, boards = games_on([served, unserved], Curriculum())
@@ -82,7 +82,7 @@ def test_a_fifth_of_own_instances_is_held_out() -> None:
     assert len(few.instances) == board.shape[0] == 3
 
 
-def test_instances_without_work_judge_nobody(network: ActorCritic) -> None:
+def test_instances_without_work_are_left_out(network: ActorCritic) -> None:
     """Where there is nothing to do no network is better than another: such instances are left out."""
     idle = Instance(ability=[1, 2], workload=[0, 0])
     busy = [paper_like(10, 3, 44, seed) for seed in range(6)]
@@ -95,7 +95,7 @@ def test_instances_without_work_judge_nobody(network: ActorCritic) -> None:
         hold_out([idle, idle])
 
 
-def test_validation_games_are_always_the_same() -> None:
+def test_validation_games_are_fixed() -> None:
     """Paper-like games of scenario 1's size come first, then every family twice."""
     boards, again = (validation_boards(Curriculum()) for _ in range(2))
     assert [board.shape[:2] for board in boards] == [(12, 100), (2 * len(RECIPES), 60)]

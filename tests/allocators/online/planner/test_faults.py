@@ -58,7 +58,7 @@ def planner(pair):
         yield planner
 
 
-def test_invalid_input_is_one_error_and_changes_nothing(planner, tmp_path):
+def test_invalid_input_is_an_error_and_changes_nothing(planner, tmp_path):
     """Out of order, twice, unknown, not a number, impossible: one line that names the field, and the same state."""
     plan = planner.plan()
     planner.save(tmp_path / "before.json")
@@ -75,7 +75,7 @@ def test_invalid_input_is_one_error_and_changes_nothing(planner, tmp_path):
     assert planner.plan() is plan
 
 
-def test_a_killed_planner_is_restored_with_the_same_plan(pair, tmp_path):
+def test_killed_planner_is_restored_with_the_same_plan(pair, tmp_path):
     """Restored from its file, it has the same plan and causes, and makes the same plans from then on."""
     file = tmp_path / "planner.json"
     later = [
@@ -146,7 +146,7 @@ class Slow(Policy):
         return type("Decider", (AgentDecider,), {"decide": decide})()
 
 
-def test_the_deadline_holds_whatever_the_policy_does(pair):
+def test_deadline_is_respected_with_a_late_policy(pair):
     """With a late policy, the last orders stay; orders given in time count now, and the others in the next plan."""
     policy = Slow(0.3)
     with MissionPlanner(pair, policy, deadline_ms=400) as planner:
@@ -177,7 +177,7 @@ def test_all_agents_get_a_turn_with_a_slow_policy():
         assert not plan.is_new
 
 
-def test_ten_threads_at_once(pair, tmp_path):
+def test_ten_threads_can_share_a_planner(pair, tmp_path):
     """With reports, plans, pins and saves from ten threads, nothing is lost, and every plan can be followed."""
     problems = []
 
@@ -225,7 +225,7 @@ def test_asyncio_is_not_blocked_while_it_plans(pair):
     assert dict(plan) == {"ann": Order("t2"), "ben": Order("t2")}
 
 
-def test_a_closed_planner_says_so(pair):
+def test_closed_planner_raises(pair):
     """A closed planner raises an error instead of waiting forever."""
     planner = MissionPlanner(pair, "nearest", None)
     planner.close()

@@ -105,7 +105,7 @@ def test_costs_do_not_grow_with_closed_tasks_and_agents(few, policy, tmp_path):
     assert len(planner._leader._agents) <= 3 + 2 * (3 + FEW)
 
 
-def test_old_closed_tasks_are_unknown(few, tmp_path):
+def test_oldest_closed_tasks_are_forgotten(few, tmp_path):
     """Only the last closed tasks can be reopened, also in a restored planner; older ids can be used anew."""
     with MissionPlanner(crew(), "nearest", None) as planner:
         for number in range(3, 40):
@@ -127,7 +127,7 @@ def test_old_closed_tasks_are_unknown(few, tmp_path):
                 assert again.plan() == planner.plan()
 
 
-def test_a_task_that_is_the_goal_of_a_flight_is_not_forgotten(few):
+def test_target_of_a_flight_is_not_forgotten(few):
     """Whatever is closed meanwhile, the agent on its way there gets its next order as usual."""
     with MissionPlanner(crew(), "nearest", None) as planner:
         planner.submit({"event": "task-appears", "task": {"id": "far", "workload": 1, "position": [500, 0]}})
@@ -142,7 +142,7 @@ def test_a_task_that_is_the_goal_of_a_flight_is_not_forgotten(few):
         assert planner.plan().problem is None
 
 
-def test_news_without_plans_are_limited(few):
+def test_number_of_news_between_plans_is_limited(few):
     """If no plan is requested for long, only the last news are kept."""
     with MissionPlanner(crew(), "nearest", None) as planner:
         planner.plan()
@@ -153,7 +153,7 @@ def test_news_without_plans_are_limited(few):
         assert planner._picture.news == []
 
 
-def test_routes_forget_closed_tasks(few, monkeypatch):
+def test_routes_forgets_closed_tasks(few, monkeypatch):
     """The policy `routes` drops its data on growing tasks and on distances by a table once tasks are closed."""
     monkeypatch.setattr(describe, "MOST_REMEMBERED", FEW)
     monkeypatch.setattr(tables, "MOST_WAYS", FEW)

@@ -38,7 +38,7 @@ def inputs(rng, step, agent, task):
     ]
 
 
-def test_laws_hold_and_plans_are_restored(tmp_path):
+def test_conservation_laws_hold_and_plans_are_restored(tmp_path):
     """Laws hold at all events of 20 random missions, no policy fails, and restored planners behave as the originals."""
     accepted = 0
     for seed in range(20):
@@ -65,7 +65,7 @@ def test_laws_hold_and_plans_are_restored(tmp_path):
     assert accepted > 100
 
 
-def test_little_work_that_grows_is_accounted_for():
+def test_small_growing_work_is_accounted_for():
     """Work that has grown is not mistaken for a rounding error, however little it is."""
     instance = Instance(ability=[1], workload=[1], agent_position=[[0, 0]], task_position=[[9, 9]], speed=[1])
     with MissionPlanner(Mission(instance, growth=[0.7]), "idle", None) as planner:

@@ -18,7 +18,7 @@ def tasks(planner):
     return {agent: order.task for agent, order in planner.plan().items()}
 
 
-def test_orders_follow_events(pair):
+def test_orders_respond_to_events(pair):
     """Plans follow a failure, a new task and a completion, and name them as causes."""
     with MissionPlanner(pair, "nearest", None) as planner:
         assert tasks(planner) == {"ann": "t1", "ben": "t2"}
@@ -56,7 +56,7 @@ def test_reports_correct_the_state(pair):
         assert planner.plan(4.51)["ann"] == STAY
 
 
-def test_an_agent_that_cannot_go_on_has_no_order(pair):
+def test_agent_that_cannot_continue_has_no_order(pair):
     """A reported battery that does not suffice for the flight ends it, and the cause says so."""
     with MissionPlanner(pair, "nearest", None) as planner:
         planner.plan()
@@ -111,7 +111,7 @@ def test_work_that_was_not_done_by_the_deadline_is_missed(pair):
 
 
 @pytest.mark.parametrize("policy", ["greedy", "hedonic"])
-def test_its_state_agrees_with_the_simulation(policy):
+def test_state_agrees_with_the_simulation(policy):
     """Given the events of a mission as they happen, it gives the same orders as in a simulation, at the same hours."""
     compared = 0
     for seed in range(40):
@@ -157,7 +157,7 @@ class Stubborn(Policy):
         return decider()
 
 
-def test_a_policy_that_fails_leaves_the_last_plan(pair):
+def test_failing_policy_leaves_the_last_plan(pair):
     """The plan says why it is not new; orders that cannot be followed are not given."""
     answers = {"now": lambda view: Order("t1")}
     with MissionPlanner(pair, Stubborn(lambda view: answers["now"](view)), None) as planner:
@@ -173,7 +173,7 @@ def test_a_policy_that_fails_leaves_the_last_plan(pair):
             assert dict(planner.plan()) == {"ben": Order("t1")}
 
 
-def test_void_entries_are_dropped(pair):
+def test_obsolete_entries_are_dropped(pair):
     """However often agents are diverted, the agenda stays small, and no garbage is collected meanwhile."""
     seen = []
 
@@ -190,7 +190,7 @@ def test_void_entries_are_dropped(pair):
     assert gc.isenabled()
 
 
-def test_settings_belong_to_names(pair):
+def test_parameters_require_a_policy_name(pair):
     """Parameters for a policy given as an object, and unknown parameters, are errors."""
     with pytest.raises(InputError, match="policy: is an object with its own parameters"):
         MissionPlanner(pair, Stubborn(lambda view: None), stay=1)

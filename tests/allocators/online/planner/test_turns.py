@@ -57,7 +57,7 @@ def told(planner: MissionPlanner, rng: np.random.Generator, step: int) -> dict[s
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_orders_are_those_of_separate_decisions(seed, monkeypatch):
+def test_orders_match_separate_decisions(seed, monkeypatch):
     """In random missions of all kinds, both planners have the same plans, whatever happens.
 
     In separate decisions, an agent guesses the choices of free neighbours, which is not needed in turns.

@@ -10,7 +10,7 @@ from alloc.problems import MissionParameters, Recorder, random_mission
 from alloc.problems.missions.events import EventKind
 
 
-def test_a_picture_shows_what_has_happened_by_then() -> None:
+def test_frame_shows_the_state_at_its_hour() -> None:
     """A task has a name from when it appears; an agent that has failed is a cross, and no square any more."""
     mission = random_mission(MissionParameters(family="failures", agents=6, tasks=10), seed=3)
     recorder = Recorder()

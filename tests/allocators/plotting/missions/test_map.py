@@ -8,7 +8,7 @@ from alloc.allocators.plotting.missions.map import name_tasks, plane_of, prepare
 from alloc.problems import Instance, Mission, Recorder
 
 
-def test_no_name_is_on_the_frame() -> None:
+def test_labels_do_not_cross_the_frame() -> None:
     """A task with much work at the upper edge has its name below or beside it, not across the frame."""
     instance = Instance(
         ability=[1],

@@ -51,7 +51,7 @@ def page(course: Course, tmp_path: Path) -> Path:
     return tmp_path / "run.html"
 
 
-def test_the_page_needs_nothing_else(page: Path) -> None:
+def test_page_is_self_contained(page: Path) -> None:
     """There is one file without links, whose policy forbids to load anything, and names are data, never markup."""
     text = page.read_text(encoding="utf-8")
     assert re.findall(r"""\s(?:src|href)=["']?([^"'>\s]+)""", text.replace("src=x", "")) == ["data:,"]
@@ -61,7 +61,7 @@ def test_the_page_needs_nothing_else(page: Path) -> None:
     assert "Mike Bostock" in text  # the licence of the library asks for its notice
 
 
-def test_knowledge_in_the_page_is_what_was_recorded(course: Course) -> None:
+def test_page_contains_the_recorded_knowledge(course: Course) -> None:
     """Each hour of a report is kept to a part in 65,000 of the mission, and 0 stands for what was not known."""
     import base64
 
@@ -75,7 +75,7 @@ def test_knowledge_in_the_page_is_what_was_recorded(course: Course) -> None:
     assert np.isnan(recorded).any()
 
 
-def test_who_looks_around_knows_of_no_task_out_of_sight(course: Course) -> None:
+def test_agents_do_not_know_tasks_beyond_their_sensing_radius(course: Course) -> None:
     """At the beginning an agent knows itself and what lies within 2, and nothing of what has not appeared."""
     assert course.awareness is not None
     first = ~np.isnan(course.awareness.reports[:, 1])  # the second moment: all have looked around
@@ -116,7 +116,7 @@ document.body.replaceChildren(JSON.stringify(out));
 
 
 @needs_browser
-def test_a_browser_plays_scrubs_and_follows(page: Path, course: Course, tmp_path: Path) -> None:
+def test_page_plays_and_scrubs(page: Path, course: Course, tmp_path: Path) -> None:
     """The page has a heading, begins at 0, shows another hour when the slider moves, plays, and stops; no errors."""
     failed = "<b> has failed."
     heading = title(course).split("\n")[0]
@@ -124,7 +124,7 @@ def test_a_browser_plays_scrubs_and_follows(page: Path, course: Course, tmp_path
     assert run_in_browser(page, SCRIPT, tmp_path) == expected
 
 
-def test_a_log_gives_the_same_course(course: Course) -> None:
+def test_log_gives_the_same_course(course: Course) -> None:
     """What was recorded of a run is found again from its log, but for what agents knew; and the log is the same."""
     run = simulate(rescue(), "greedy")
     again = course_of(run.log)
@@ -137,7 +137,7 @@ def test_a_log_gives_the_same_course(course: Course) -> None:
     assert again.awareness is None
 
 
-def test_a_film_is_written(course: Course, tmp_path: Path) -> None:
+def test_film_is_written(course: Course, tmp_path: Path) -> None:
     """A .gif has as many pictures as were asked for, and they are not all alike."""
     from PIL import Image, ImageChops
 
@@ -149,7 +149,7 @@ def test_a_film_is_written(course: Course, tmp_path: Path) -> None:
         assert ImageChops.difference(first, film.convert("RGB")).getbbox() is not None
 
 
-def test_without_ffmpeg_an_mp4_is_refused_in_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_mp4_without_ffmpeg_is_refused_in_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
     """It is said what is missing, and what can be written instead."""
     monkeypatch.setenv("PATH", "")
     with pytest.raises(InputError, match=r"run\.mp4: needs the program ffmpeg, .* or write \.gif or \.html"):

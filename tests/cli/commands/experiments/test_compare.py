@@ -39,7 +39,7 @@ def test_headings_have_the_units_that_all_instances_share(alloc, small):
     assert re.search(r" T +worst .* energy +time", ran.err)
 
 
-def test_table_for_people_and_csv(alloc, small):
+def test_table_and_csv_have_the_same_rows(alloc, small):
     """People get a table on standard error; --csv writes the same rows, - to standard output."""
     ran = alloc("compare", "small.json", "--methods", "greedy", "--csv", "t.csv")
     assert (ran.code, ran.out) == (0, "")
@@ -50,7 +50,7 @@ def test_table_for_people_and_csv(alloc, small):
     assert alloc("compare", "small.json", "--methods", "greedy", "--csv", "-").out.startswith("instance,method,")
 
 
-def test_a_refusal_is_a_row(alloc):
+def test_refusal_is_a_row(alloc):
     """A method that refuses an instance has a row with the reason, and the others have their figures."""
     Path("fast.json").write_text(
         json.dumps(
@@ -81,7 +81,7 @@ def compared(monkeypatch):
 
 
 @pytest.mark.parametrize(("text", "seeds"), [("3", [0, 1, 2]), ("7,", [7]), ("4,2,4", [4, 2]), ("0, 5", [0, 5])])
-def test_seeds(alloc, small, compared, text, seeds):
+def test_seeds_are_a_count_or_a_list(alloc, small, compared, text, seeds):
     """A number is a count, a list is a list."""
     alloc("compare", "small.json", "--methods", "greedy", "--seeds", text)
     assert compared == [({"greedy": "greedy"}, seeds)]
@@ -112,13 +112,13 @@ def test_methods_with_parameters_in_brackets(alloc, small, compared, monkeypatch
 
 
 @pytest.mark.parametrize("methods", ["ga[population=3", "ga[population=3]x", "ga[population]", "ga[nonsense=3]"])
-def test_wrong_brackets_are_bad_usage(alloc, small, methods):
+def test_invalid_brackets_are_bad_usage(alloc, small, methods):
     """Text that is not NAME[PARAMETER=VALUE,...], or an unknown parameter, gives one line and exit code 2."""
     ran = alloc("compare", "small.json", "--methods", methods)
     assert (ran.code, ran.out, ran.err.count("\n")) == (2, "", 1)
 
 
-def test_instances_are_named_alike_with_and_without_a_store(alloc):
+def test_instances_have_the_same_names_with_and_without_a_store(alloc):
     """Folders, patterns and families also work without a store, and folders and patterns of missions."""
     alloc("generate", "random", "--agents", "4", "--tasks", "2", "--count", "2", "--seed", "1", "--output", "some")
     for source, names in (

@@ -64,7 +64,7 @@ def test_one_point_with_energy_is_drawn(alloc, small):
         ('{"format": "alloc-pareto/1", "points": [{"assignment": {"x": "t1"}}]}', "points[0].assignment: no agent 'x'"),
     ],
 )
-def test_broken_fronts_are_told(alloc, small, text, words):
+def test_invalid_fronts_are_reported(alloc, small, text, words):
     """An invalid front gives one line with the file and the place, and exit code 2."""
     Path("front.json").write_text(text)
     ran = alloc("pareto", "small.json", "--start", "front.json")

@@ -16,7 +16,7 @@ def store(tmp_path, monkeypatch):
     fill(tmp_path / "runs.db", instances=1)
 
 
-def test_the_page_is_written_and_its_runs_are_counted(tmp_path, capsys):
+def test_page_is_written_and_runs_are_counted(tmp_path, capsys):
     """Stores are read, the title is that of the page, and an older page is replaced."""
     (tmp_path / "report.html").write_text("old")
     assert main(["report", "runs.db", "-o", "report.html", "--title", "One & two"]) == 0

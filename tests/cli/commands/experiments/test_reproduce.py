@@ -8,7 +8,7 @@ from alloc.allocators.experiments.reproduction import figures
 DOCS = Path(__file__).parents[4] / "docs" / "reproduction"
 
 
-def test_a_page_from_rows_alone(alloc, monkeypatch):
+def test_page_is_made_from_stored_rows(alloc, monkeypatch):
     """With --page nothing is run: page and figures are made from the rows in the folder."""
     drawn = []
     monkeypatch.setattr(figures, "draw_all", lambda learned, solved, folder: drawn.append(folder))
@@ -20,7 +20,7 @@ def test_a_page_from_rows_alone(alloc, monkeypatch):
     assert drawn == [Path("here/reproduction")]
 
 
-def test_a_short_run(alloc):
+def test_short_run(alloc):
     """Runs are made in processes and not repeated; parts without runs are mentioned."""
     command = ("reproduce", "out", "--runs", "1", "--methods", "greedy", "--workers", "1")
     ran = alloc(*command)
@@ -31,7 +31,7 @@ def test_a_short_run(alloc):
     assert Path("out/reproduction/others.csv").read_text() == rows
 
 
-def test_bad_usage(alloc):
+def test_bad_usage_is_one_line(alloc):
     """Unknown methods and folders without runs are one-line errors."""
     for options in (("out", "--methods", "gapo"), ("nowhere", "--page"), ("out", "--runs", "0")):
         ran = alloc("reproduce", *options)

@@ -48,7 +48,7 @@ def begun():
 
 
 @pytest.mark.usefixtures("in_process")
-def test_only_what_is_missing_is_run(alloc, plugin):
+def test_only_missing_runs_are_made(alloc, plugin):
     """With an additional seed, instance or method, only missing runs are made; the table has the requested ones."""
     first = alloc("compare", f"{TINY}:1", "--methods", "nap", *QUICK, "--json")
     assert (first.code, len(begun())) == (0, 1)
@@ -67,7 +67,7 @@ def test_only_what_is_missing_is_run(alloc, plugin):
 
 
 @pytest.mark.usefixtures("in_process")
-def test_rows_are_those_of_a_comparison_without_a_store(alloc):
+def test_rows_match_a_comparison_without_a_store(alloc):
     """Rows are the same as without a store, except for times."""
     words = ("compare", f"{TINY}:0-1", "--methods", "greedy,ga[population=4]", "--seeds", "2", "--iterations", "5")
     kept = alloc(*words, "--store", "runs.db", "--json").json["rows"]
@@ -80,7 +80,7 @@ def test_rows_are_those_of_a_comparison_without_a_store(alloc):
 
 
 @pytest.mark.usefixtures("in_process")
-def test_other_budgets_are_other_runs(alloc):
+def test_runs_with_other_budgets_are_ignored(alloc):
     """Runs with another budget are ignored, with a note."""
     alloc("compare", f"{TINY}:0", "--methods", "greedy", *QUICK)
     other = alloc("compare", f"{TINY}:0", "--methods", "greedy", "--iterations", "6", "--store", "runs.db")
@@ -102,7 +102,7 @@ def test_differences_are_printed_and_reported(alloc):
 
 
 @pytest.mark.slow
-def test_failures_have_rows_and_are_tried_again_where_asked(alloc, plugin):
+def test_failures_have_rows_and_are_retried_on_request(alloc, plugin):
     """A failure has a row with the reason; it is repeated only with --retry, which keeps good runs."""
     words = ("compare", f"{TINY}:0", "--methods", "leave,nap", *QUICK)
     ran = alloc(*words)
@@ -165,7 +165,7 @@ def test_wrong_methods_are_one_line(alloc, methods, message):
 
 
 @pytest.mark.usefixtures("in_process")
-def test_a_method_without_any_figure_is_reported(alloc, plugin):
+def test_method_without_results_is_reported(alloc, plugin):
     """A method that refuses everything, or lacks a package, has dashes and a reason in the report."""
     words = ("compare", f"{TINY}:0", "covering[agents=4,tasks=2]:0", "--methods", "greedy,refuse,missing", *QUICK)
     ran = alloc(*words, "--report", "table.md")
@@ -176,7 +176,7 @@ def test_a_method_without_any_figure_is_reported(alloc, plugin):
 
 
 @pytest.mark.usefixtures("in_process")
-def test_a_full_disk_is_one_line_and_loses_nothing(alloc, plugin):
+def test_full_disk_is_one_line_and_loses_nothing(alloc, plugin):
     """If the disk becomes full, stored runs are kept; with free space the same command resumes from there."""
     words = ("compare", f"{TINY}:0-1", "--methods", "greedy,answer", "--seeds", "10", *QUICK)
     before, handler = resource.getrlimit(resource.RLIMIT_FSIZE), signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
@@ -221,7 +221,7 @@ def test_wrong_options_are_one_line(alloc, words, message):
     assert ran.err.count("\n") == 1
 
 
-def test_ctrl_c_keeps_what_has_ended(plugin):
+def test_ctrl_c_keeps_completed_runs(plugin):
     """Ctrl-C prints the rows of completed runs, with exit code 1; no run is in progress or leased afterwards."""
     command = [sys.executable, "-m", "alloc.cli", "compare", f"{TINY}:0", "--methods", "nap", "--seeds", "500", *QUICK]
     process = subprocess.Popen(command, cwd=plugin, stderr=subprocess.PIPE, text=True)
@@ -237,7 +237,7 @@ def test_ctrl_c_keeps_what_has_ended(plugin):
     assert 1 <= store.execute("SELECT count(*) FROM runs").fetchone()[0] < 500
 
 
-def test_runs_end_with_a_command_that_is_killed(plugin):
+def test_runs_end_with_their_killed_command(plugin):
     """If a command is killed, its run and all processes that the run has started end, too."""
     command = [sys.executable, "-m", "alloc.cli", "compare", f"{TINY}:0", "--methods", "fork", "--seeds", "99", *QUICK]
     process = subprocess.Popen(command, cwd=plugin, stderr=subprocess.DEVNULL)
@@ -259,7 +259,7 @@ def _is_there(pid):
 
 
 @pytest.mark.slow
-def test_two_commands_that_are_killed_lose_no_run_and_make_none_twice(tmp_path):
+def test_two_killed_commands_store_every_run_once(tmp_path):
     """With two commands on one store, killed repeatedly, every run is stored once, and no lease is left."""
     found = kill_often(tmp_path, seeds=3, kills=3, nap_s=0.4, workers=1, gap_s=(1.0, 2.0))
     assert found.kills >= 1
@@ -268,7 +268,7 @@ def test_two_commands_that_are_killed_lose_no_run_and_make_none_twice(tmp_path):
 
 
 @pytest.mark.usefixtures("in_process")
-def test_policies_in_missions_are_kept(alloc, plugin):
+def test_runs_of_policies_are_stored(alloc, plugin):
     """Runs of policies are made once, in separate processes; rows equal those without a store; reports are complete."""
     alloc("generate", "mission", "--agents", "2", "--tasks", "2", "--seed", "1", "--output", "m.json")
     words = ("compare", "m.json", "--policies", "nearest,replan", "--seeds", "2")
@@ -295,7 +295,7 @@ def test_policies_in_missions_are_kept(alloc, plugin):
     assert [row["tasks_done"] for row in rows] == ["2", "", "2", ""]
 
 
-def test_before_the_first_run_has_ended_there_is_nothing_to_compare(alloc, monkeypatch):
+def test_interrupt_before_the_first_run_prints_no_differences(alloc, monkeypatch):
     """If interrupted at once, a note says how to resume, and there is no table of differences."""
     monkeypatch.setattr("alloc.allocators.experiments.campaign.Campaign.run", lambda self, stop: False)
     ran = alloc("compare", f"{TINY}:1", "--methods", "greedy,auction", *QUICK)

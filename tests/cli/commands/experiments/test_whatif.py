@@ -27,7 +27,7 @@ def test_table_answer_and_files(alloc, small):
     assert "<svg" in Path("fleets.svg").read_text("utf-8")
 
 
-def test_json_is_all_of_standard_output(alloc, small):
+def test_json_is_alone_on_standard_output(alloc, small):
     """With --json only the document is printed, and no table."""
     ran = alloc("whatif", "small.json", "--remove", "a3", "--method", "milp", "--json", "--quiet")
     assert (ran.code, ran.err) == (0, "")
@@ -74,7 +74,7 @@ def test_ctrl_c_saves_the_fleets_so_far(alloc, small, monkeypatch):
     assert found["answer"] == "interrupted before a fleet was changed"
 
 
-def test_units_stand_in_the_table(alloc):
+def test_table_has_units(alloc):
     """The heading has the units of the instance."""
     instance = Instance(ability=[1, 2], workload=[3], units=Units(time="min", energy="Wh"))
     write_instance(instance, "timed.json")
