@@ -195,9 +195,10 @@ function crosses([[ax, ay], [bx, by]], left, top, right, bottom) {
   return from < to;
 }
 function drawLabels() {
-  const [labels, taken] = [byId("labels"), []];
+  const labels = byId("labels");
   labels.replaceChildren();
   const { clientWidth: width, clientHeight: height } = svg;
+  const taken = [24, 44].map((y) => [width - 70, y, 64]); // the zoom buttons
   const named = order.map((j) => plan.tasks[j]).filter((task) => task.place && task.isShown)
     .map((task) => ({ text: task.id, place: task.place, away: task.radius + 4 }));
   plan.bases.forEach((base, b) => {

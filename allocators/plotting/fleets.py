@@ -72,8 +72,8 @@ def _bars(axes: "Axes", values: Sequence[float | None], bounds: Sequence[float |
     at = range(len(values))
     axes.bar(at, [value or 0.0 for value in values], color=colour, label="best found", width=0.7)
     if any(bound is not None for bound in bounds):
-        axes.bar(at, [bound or 0.0 for bound in bounds], color=LIMIT, label="proven to be needed", width=0.7)
-    axes.set_ylim(0, max((value or 0.0 for value in values), default=0.0) * 1.25 or 1.0)
+        axes.bar(at, [bound or 0.0 for bound in bounds], color=LIMIT, label="lower bound", width=0.7)
+    axes.set_ylim(0, max((value or 0.0 for value in values), default=0.0) * 1.35 or 1.0)
     for place, value in enumerate(values):
         if value is not None and len(values) <= MOST_LABELS:
             axes.annotate(f"{value:.3g}", (place, value), (0, 2), textcoords="offset points", ha="center", fontsize=9)
@@ -91,11 +91,12 @@ def _name(axes: "Axes", fleets: Sequence["Fleet"]) -> None:
 def _changed(fleet: "Fleet") -> str:
     less, more = fleet.removed, f"+{len(fleet.added)}" if fleet.added else ""
     if not less:
-        return more or "now"
+        return more or "current"
     return f"−{plain_text(shortened(less[0], 12)) if len(less) == 1 else len(less)}{' ' + more if more else ''}"
 
 
 def _title(found: "WhatIf") -> str:
     name = plain_text(shortened(found.instance.name, 60))
     size = f"{counted(found.instance.n, 'agent')}, {counted(found.instance.m, 'task')}"
-    return "\n".join([f"{name}: {size}", *map(plain_text, wrap(shortened(found.answer, 260), 95))])
+    answer = shortened(found.answer, 260).replace(" %", "\N{NO-BREAK SPACE}%")
+    return "\n".join([f"{name}: {size}", *map(plain_text, wrap(answer, 95))])

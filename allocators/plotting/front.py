@@ -77,7 +77,7 @@ def _draw(front: "Front") -> "Figure":
 
 
 def _draw_bounds(axes: "Axes", front: "Front") -> None:
-    """Shade the region that is proven impossible: below the energy bound of each run, up to its makespan limit."""
+    """Shade the region that is proven infeasible: below the energy bound of each run, up to its makespan limit."""
     proven = [
         (max(result.makespan or 0.0, result.makespan_limit or 0.0), result.energy_lower_bound or 0.0)
         for result in front.points
@@ -85,7 +85,7 @@ def _draw_bounds(axes: "Axes", front: "Front") -> None:
     left = front.points[0].lower_bound or 0.0
     axes.axvspan(0, left, color=LIMIT, alpha=0.35, linewidth=0)
     for place, (limit, bound) in enumerate(proven):
-        label = "proven impossible" if place == 0 else None
+        label = "proven infeasible" if place == 0 else None
         axes.fill_between([left, limit], 0, bound, color=LIMIT, alpha=0.35, linewidth=0, label=label)
         left = limit
 

@@ -34,15 +34,15 @@ def draw_legend(axes: "Axes", result: "Result", begin: list[Base], *, counts: bo
     if any(len(base.agents) > 1 for base in begin):
         entries.append(_mark("s", "base (number of agents)", MOVE, 6))
     if any(len(base.agents) == 1 for base in begin):
-        entries.append(_mark("o", "start of one agent", MOVE, 5))
+        entries.append(_mark("o", "start of a single agent", MOVE, 5))
     if any(not len(base.agents) for base in begin):
-        entries.append(_mark("D", "base to return to", MOVE, 5))
+        entries.append(_mark("D", "return base", MOVE, 5))
     if any(is_idle(result, base) for base in begin):
-        entries.append(_mark("o", "all idle there", "white", 5, edge=MOVE))
+        entries.append(_mark("o", "start, all agents idle", "white", 5, edge=MOVE))
     if moves:
-        entries.append(Polygon([(0, 0)], facecolor=MOVE, alpha=0.5, label="move, thin end at the task"))
+        entries.append(Polygon([(0, 0)], facecolor=MOVE, alpha=0.5, label="move, tapering to the task"))
     if returns:
-        entries.append(Line2D([], [], color=MOVE, linewidth=0.9, linestyle=(0, (4, 3)), label="flight back to a base"))
+        entries.append(Line2D([], [], color=MOVE, linewidth=0.9, linestyle=(0, (4, 3)), label="return flight"))
     axes.legend(
         handles=entries,
         handler_map={Polygon: _wedge_handler()},

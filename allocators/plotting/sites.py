@@ -161,7 +161,7 @@ def _finish(axes: "Axes", result: "Result", where: Places) -> None:
     if high[0] > 180 and result.instance.metric == "geographic":
         axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{(value + 180) % 360 - 180:g}"))
     if result.instance.n > MAX_AGENTS:
-        axes.set_title(f"moves of {MAX_AGENTS} of the agents are drawn", fontsize=9)
+        axes.set_title(f"moves of a sample of {MAX_AGENTS} agents", fontsize=9)
     axes.grid(color="0.92", linewidth=0.6)
     axes.set_axisbelow(True)
     if is_late_coloured(result):

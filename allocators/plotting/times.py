@@ -118,7 +118,7 @@ def listed(names: Sequence[str], longest: int) -> str:
 def _name_columns(axes: "Axes", result: "Result", top: float) -> None:
     axes.set_xlim(-0.6, result.instance.m - 0.4)
     axes.set_ylim(0, MARGIN * top)
-    axes.set_xlabel("tasks, the last one first")
+    axes.set_xlabel("tasks by decreasing completion time")
     axes.set_ylabel(heading("completion time", result.instance.units.time))
 
 

@@ -158,7 +158,7 @@ def _draw_tracks(axes: "Axes", course: Course, plane: Plane) -> None:
         marker="s",
         color=colours,
         zorder=3,
-        label="start of an agent",
+        label="start of agent",
     )
     failed = [
         corners[-1]

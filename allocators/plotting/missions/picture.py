@@ -76,11 +76,16 @@ def _draw(course: "Course") -> "Figure":
 
 
 def _explain(axes: "Axes") -> None:
+    from matplotlib.collections import PathCollection
+    from matplotlib.legend_handler import HandlerPathCollection
+
     handles, _ = axes.get_legend_handles_labels()
     axes.legend(
         handles=handles,
+        handler_map={PathCollection: HandlerPathCollection(sizes=[40])},  # tasks may be much larger
         loc="upper center",
-        bbox_to_anchor=(0.5, -0.1),
+        bbox_to_anchor=(0.5, 0.0),
+        borderaxespad=5.0,  # below the axis label, whatever the height of the map
         ncols=4,
         frameon=False,
         fontsize=8,

@@ -4,13 +4,13 @@ const byId = (name) => document.getElementById(name);
 const { agents, tasks, agentStates, taskStates, end } = mission;
 const stateOf = Object.fromEntries(taskStates.map((state, number) => [state.name, number]));
 const WORKS = 0;
-const DURATION = 30; // seconds that the whole mission takes at speed 1
+const DURATION = 30; // of the whole mission at speed 1, in seconds
 const canvas = byId("map");
 const player = { hour: 0, isPlaying: false, followed: -1, showsKnown: false, zoom: d3.zoomIdentity };
 const hours = (value) => `${value.toFixed(end < 10 ? 2 : 1)} ${mission.unit || "h"}`;
 const colourOf = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 
-// what was true at an hour
+// the true state at an hour
 const firstAfter = d3.bisector((leg) => leg[0]).right;
 const legAt = (agent, hour) => agent.legs[firstAfter(agent.legs, hour) - 1];
 function placeAt(agent, hour) {
@@ -29,7 +29,7 @@ function taskAt(task, hour) {
 }
 const most = tasks.map((task) => d3.max(task.levels, (level) => level[1]) || 0);
 const largest = d3.max(most) || 1;
-const spans = tasks.map(() => []); // when somebody works there, for how long: [begin, end]
+const spans = tasks.map(() => []); // intervals of work at each task: [begin, end]
 agents.forEach((agent) => agent.legs.forEach((leg) => { if (leg[4] === WORKS && leg[5] >= 0) spans[leg[5]].push([leg[0], leg[1]]); }));
 const isWorkedOn = (j, hour) => spans[j].some(([begin, until]) => begin <= hour && hour < until);
 function stateAt(j, hour) {
@@ -39,7 +39,7 @@ function stateAt(j, hour) {
   return { ...found, name, number: stateOf[name] };
 }
 
-// what an agent knew: all of it was true at the hour of its last report
+// the knowledge of agents: everything was true at the hour of its last report
 const knowledge = mission.knowledge && { ...mission.knowledge, reports: null };
 if (knowledge) {
   const bytes = Uint8Array.from(atob(mission.knowledge.reports), (letter) => letter.charCodeAt(0));
@@ -81,7 +81,7 @@ function disc(pen, [x, y], radius, fill, edge, width = 1.5) {
   if (fill) { pen.fillStyle = fill; pen.fill(); }
   if (edge) { pen.strokeStyle = edge; pen.lineWidth = width; pen.stroke(); }
 }
-function word(pen, text, x, y, align = "center") {
+function drawText(pen, text, x, y, align = "center") {
   pen.font = "12px system-ui, sans-serif";
   pen.textAlign = align;
   pen.lineWidth = 3;
@@ -90,7 +90,7 @@ function word(pen, text, x, y, align = "center") {
   pen.fillStyle = colourOf("--text");
   pen.fillText(text, x, y);
 }
-function sharp(target) {
+function prepareCanvas(target) {
   const ratio = window.devicePixelRatio || 1;
   const [width, height] = [Math.round(target.clientWidth * ratio), Math.round(target.clientHeight * ratio)];
   if (target.width !== width || target.height !== height) Object.assign(target, { width, height });
@@ -101,27 +101,27 @@ function sharp(target) {
 }
 let marks = [];
 function drawMap() {
-  const pen = sharp(canvas);
+  const pen = prepareCanvas(canvas);
   marks = [];
   if (player.followed >= 0 && player.zoom.k > 1) centre();
   scales = scaled();
-  if (!scales) return word(pen, "no places are known", canvas.clientWidth / 2, canvas.clientHeight / 2);
+  if (!scales) return drawText(pen, "no positions are given", canvas.clientWidth / 2, canvas.clientHeight / 2);
   drawAxes(pen);
   const reports = isKnownShown() ? reportsOf(player.followed, player.hour) : null;
   if (player.followed >= 0) drawReach(pen);
   drawTrails(pen, reports);
   tasks.forEach((task, j) => drawTask(pen, task, j, reports));
-  const crowds = new Map(); // those that are at one place stand around it
+  const groups = new Map(); // agents at one position are drawn around it
   for (const i of agents.keys()) {
     const hour = reports && i !== player.followed ? reports(i) : player.hour;
     const place = hour === null ? null : placeAt(agents[i], hour);
     if (!place) continue;
     const spot = toScreen(place);
     const key = spot.map(Math.round).join();
-    if (!crowds.has(key)) crowds.set(key, []);
-    crowds.get(key).push({ i, hour, spot, isAged: reports !== null && i !== player.followed });
+    if (!groups.has(key)) groups.set(key, []);
+    groups.get(key).push({ i, hour, spot, isAged: reports !== null && i !== player.followed });
   }
-  for (const crowd of crowds.values()) crowd.forEach((one, rank) => drawAgent(pen, one, rank, crowd.length));
+  for (const group of groups.values()) group.forEach((one, rank) => drawAgent(pen, one, rank, group.length));
 }
 function drawAxes(pen) {
   const { clientWidth: width, clientHeight: height } = canvas;
@@ -177,8 +177,8 @@ function drawTask(pen, task, j, reports) {
   const hour = reports ? reports(agents.length + j) : player.hour;
   const found = hour === null || !task.place ? null : stateAt(j, hour);
   if (!found) return;
-  const [place, crowd] = [toScreen(task.place), Math.min(1, Math.sqrt(60 / tasks.length))];
-  const full = 4 + 16 * crowd * Math.sqrt(most[j] / largest);
+  const [place, shrink] = [toScreen(task.place), Math.min(1, Math.sqrt(60 / tasks.length))];
+  const full = 4 + 16 * shrink * Math.sqrt(most[j] / largest);
   const { colour, name } = taskStates[found.number];
   const isOver = found.status !== "open";
   pen.globalAlpha = reports ? freshness(hour) : 1;
@@ -190,7 +190,7 @@ function drawTask(pen, task, j, reports) {
   const age = reports ? `\nas of ${hours(hour)}` : "";
   const rest = isOver ? "" : `, ${found.left.toPrecision(3)} of work left${task.deadline === null ? "" : `, deadline ${hours(task.deadline)}`}`;
   marks.push({ place, reach: full, text: `${task.id}: ${name}${rest}${age}` });
-  if (tasks.length <= 60) word(pen, task.id.length > 18 ? `${task.id.slice(0, 17)}…` : task.id, place[0], place[1] - full - 4);
+  if (tasks.length <= 60) drawText(pen, task.id.length > 18 ? `${task.id.slice(0, 17)}…` : task.id, place[0], place[1] - full - 4);
 }
 function cross(pen, [x, y], size, colour) {
   pen.beginPath();
@@ -201,14 +201,14 @@ function cross(pen, [x, y], size, colour) {
   pen.stroke();
 }
 const freshness = (hour) => Math.max(0.25, 1 - 4 * (player.hour - hour) / end);
-function drawAgent(pen, { i, hour, spot, isAged }, rank, crowd) {
+function drawAgent(pen, { i, hour, spot, isAged }, rank, groupSize) {
   const agent = agents[i];
   const leg = legAt(agent, hour);
   const state = agentStates[leg[4]];
   const size = (agents.length > 100 ? 2.5 : agents.length > 20 ? 4 : 5.5) * (i === player.followed ? 1.6 : 1);
-  const isRing = crowd <= 8; // a crowd is packed like the seeds of a sunflower
-  const angle = isRing ? 2 * Math.PI * rank / crowd : 2.39996 * rank;
-  const away = isRing ? (crowd > 1 ? 1.6 * size + 0.4 * size * crowd : 0) : 1.9 * size * Math.sqrt(rank);
+  const isRing = groupSize <= 8; // larger groups are packed in a sunflower spiral
+  const angle = isRing ? 2 * Math.PI * rank / groupSize : 2.39996 * rank;
+  const away = isRing ? (groupSize > 1 ? 1.6 * size + 0.4 * size * groupSize : 0) : 1.9 * size * Math.sqrt(rank);
   const [x, y] = [spot[0] + away * Math.cos(angle), spot[1] + away * Math.sin(angle)];
   pen.globalAlpha = isAged ? freshness(hour) : 1;
   if (!state) cross(pen, [x, y], size, colourOf("--text"));
@@ -225,15 +225,15 @@ function drawAgent(pen, { i, hour, spot, isAged }, rank, crowd) {
   const where = leg[5] >= 0 ? ` (${tasks[leg[5]].id})` : "";
   marks.push({ place: [x, y], reach: size + 2, agent: i,
     text: `${agent.id}: ${state ? state.name : "failed"}${where}${isAged ? `\nas of ${hours(hour)}` : ""}` });
-  if (agents.length <= 25 || i === player.followed) word(pen, agent.id, x + size + 4, y + 4, "left");
+  if (agents.length <= 25 || i === player.followed) drawText(pen, agent.id, x + size + 4, y + 4, "left");
 }
 
-// the chart of who did what, and the hour in it
+// the Gantt chart, with the current hour
 function drawGantt() {
   const chart = byId("gantt");
   const row = Math.min(9, 120 / Math.max(agents.length, 1));
   chart.style.height = `${Math.max(12, row * agents.length)}px`;
-  const pen = sharp(chart);
+  const pen = prepareCanvas(chart);
   const x = d3.scaleLinear([0, end || 1], [0, chart.clientWidth]);
   agents.forEach((agent, i) => {
     for (const [begin, until, , , state] of agent.legs) {
@@ -248,7 +248,7 @@ function drawGantt() {
   pen.fillRect(x(player.hour) - 1, 0, 2, chart.clientHeight);
 }
 
-// a row of the table of counts, whose colours explain the map
+// a row of the table of counts, which is also the legend of the map
 function addCount(rows) {
   const added = rows.append("tr");
   const name = added.append("td");
@@ -257,7 +257,7 @@ function addCount(rows) {
   added.append("td");
   return added;
 }
-function tell() {
+function updatePanel() {
   const { hour } = player;
   byId("clock").textContent = hours(hour);
   byId("hour").value = hour;
@@ -278,23 +278,23 @@ function about() {
   const leg = legAt(agents[followed], hour);
   const state = leg && agentStates[leg[4]];
   const doing = `${agents[followed].id} ${!leg ? "has not joined" : state ? `is ${state.name}` : "has failed"}${leg && leg[5] >= 0 ? ` (${tasks[leg[5]].id})` : ""}.`;
-  if (mission.isFull) return `${doing}\nEverybody knows all that is true.`;
+  if (mission.isFull) return `${doing}\nFull knowledge: all agents know the true state.`;
   const reports = reportsOf(followed, hour);
-  if (!reports) return `${doing}\nWhat it knows was not recorded.`;
+  if (!reports) return `${doing}\nIts knowledge was not recorded.`;
   const there = tasks.map((_, j) => j).filter((j) => taskAt(tasks[j], hour));
   const known = there.filter((j) => reports(agents.length + j) !== null);
   const wrong = known.filter((j) => taskAt(tasks[j], reports(agents.length + j))?.status !== taskAt(tasks[j], hour).status);
   const age = d3.max(known, (j) => hour - reports(agents.length + j));
-  return `${doing}\nIt knows ${known.length} of ${there.length} tasks${known.length ? `, the oldest news is ${hours(age)} old` : ""}${
-    wrong.length ? `; of ${wrong.length} it does not know that they are over` : ""}.`;
+  return `${doing}\nIt knows ${known.length} of ${there.length} tasks${known.length ? `; the oldest report is ${hours(age)} old` : ""}${
+    wrong.length ? `; it does not know that ${wrong.length} of them ${wrong.length === 1 ? "is" : "are"} closed` : ""}.`;
 }
 function draw() {
   drawMap();
   drawGantt();
-  tell();
+  updatePanel();
 }
 
-// what people do
+// interaction
 function go(hour) { player.hour = Math.min(end, Math.max(0, hour)); draw(); }
 let last = null;
 function step(now) {
@@ -310,7 +310,7 @@ function play(isPlaying) {
   Object.assign(player, { isPlaying });
   last = null;
   if (isPlaying) requestAnimationFrame(step);
-  tell();
+  updatePanel();
 }
 function follow(agent) {
   player.followed = agent;
@@ -369,7 +369,7 @@ const [heading, ...below] = mission.summary;
 byId("heading").textContent = heading;
 byId("summary").textContent = below.join("\n");
 agents.forEach((agent, i) => byId("follow").add(new Option(agent.id, i)));
-const wish = new URLSearchParams(location.hash.slice(1)); // such as #hour=3&follow=a2&known
-if (wish.has("hour")) player.hour = Math.min(end, Math.max(0, Number(wish.get("hour")) || 0));
-if (wish.has("known")) { byId("known").checked = player.showsKnown = true; }
-follow(agents.findIndex((agent) => agent.id === wish.get("follow")));
+const parameters = new URLSearchParams(location.hash.slice(1)); // such as #hour=3&follow=a2&known
+if (parameters.has("hour")) player.hour = Math.min(end, Math.max(0, Number(parameters.get("hour")) || 0));
+if (parameters.has("known")) { byId("known").checked = player.showsKnown = true; }
+follow(agents.findIndex((agent) => agent.id === parameters.get("follow")));

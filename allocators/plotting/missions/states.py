@@ -17,12 +17,12 @@ TASK_COLOURS = {
 }
 """From the palette of Okabe and Ito."""
 
-WORKING, FLYING, ELSEWHERE, IDLE, AWAY = "working", "flying to a task", "flying elsewhere", "idle", "away"
+WORKING, FLYING, REPOSITIONING, IDLE, AWAY = "working", "flying to a task", "flying to a position", "idle", "away"
 
 AGENT_COLOURS = {
     WORKING: "#e69f00",
     FLYING: "#0072b2",
-    ELSEWHERE: "#9fcdec",
+    REPOSITIONING: "#9fcdec",
     IDLE: "#e4e6e8",
     AWAY: "#8c8c8c",
 }
@@ -33,7 +33,7 @@ _OVER = {TaskStatus.DONE: DONE, TaskStatus.MISSED: MISSED, TaskStatus.CANCELLED:
 def doing(leg: Leg) -> str | None:
     """Return the name of an agent's state; None if it is not in the mission."""
     if leg.status is AgentStatus.FLYING:
-        return FLYING if leg.task >= 0 else ELSEWHERE
+        return FLYING if leg.task >= 0 else REPOSITIONING
     return {AgentStatus.WORKING: WORKING, AgentStatus.IDLE: IDLE, AgentStatus.AWAY: AWAY}.get(leg.status)
 
 

@@ -81,7 +81,7 @@ def draw_messages(axes: "Axes", course: Course) -> None:
     width = period * max(1, round((course.end or 1.0) / 60 / period))  # whole periods, so that bars are even
     edges = np.arange(-period / 2, course.end + width, width)
     span = np.minimum(edges[1:], course.end + period / 2) - edges[:-1]  # the last bar holds fewer hours
-    for hours, colour, label in ((sent, "#c3ccd4", "nobody hears it"), (heard, "#0072b2", "somebody hears it")):
+    for hours, colour, label in ((sent, "#c3ccd4", "not received"), (heard, "#0072b2", "received")):
         count = np.histogram(hours, edges)[0] / np.maximum(span, period)
         axes.bar(edges[:-1], count, width, align="edge", color=colour, label=label, linewidth=0)
     axes.set_ylabel(f"messages per {course.mission.instance.units.time or 'hour'}")

@@ -128,7 +128,7 @@ def test_very_large_instances_are_drawn_by_a_sample():
     instance = random_instance(Family(agents=30_000, tasks=1_200, starts="own"), 0)
     figure = plot(solve(instance, "greedy"))
     sites, times = figure.axes[:2]
-    assert "20000 of the agents" in sites.get_title()
+    assert "sample of 20000 agents" in sites.get_title()
     assert len(sites.collections[0].get_offsets()) <= 20_000
     assert not times.patches
 
@@ -154,11 +154,11 @@ def test_other_suffixes_are_refused_before_drawing(small, tmp_path):
 
 
 def test_a_front_is_drawn_as_steps_with_its_bounds(small):
-    """The public verb for fronts returns a figure with the points found and the region proven impossible."""
+    """The public verb for fronts returns a figure with the points found and the region proven infeasible."""
     front = pareto(small, "milp", points=3, iterations=50, handle_signals=False)
     (axes,) = plot_front(front).axes
     assert axes.lines[1].get_xdata().tolist() == [result.makespan for result in front.points]
-    assert {"best found", "proven impossible"} == {text.get_text() for text in axes.get_legend().get_texts()}
+    assert {"best found", "proven infeasible"} == {text.get_text() for text in axes.get_legend().get_texts()}
 
 
 def legend(axes):
@@ -187,8 +187,8 @@ def test_bases_are_named_with_counts():
     assert legend(sites) == [
         "task; area: workload, number: agents",
         "base (number of agents)",
-        "start of one agent",
-        "move, thin end at the task",
+        "start of a single agent",
+        "move, tapering to the task",
     ]
 
 

@@ -34,7 +34,7 @@ def test_table_and_files(alloc, small):
     first = json.loads(Path("front.json").read_text())
     drawn = Path("front.svg").read_text("utf-8")
     assert f"energy {number(first['points'][0]['energy'], 4)} to T" in drawn
-    assert all(label in drawn for label in ("<!-- best found -->", "<!-- proven impossible -->"))
+    assert all(label in drawn for label in ("<!-- best found -->", "<!-- proven infeasible -->"))
     again = alloc("pareto", "small.json", "--method", "milp", "--start", "front.json", "--json").json
     assert [point["energy"] for point in again["points"]] == [point["energy"] for point in first["points"]]
 
