@@ -9,7 +9,7 @@ from alloc.allocators.learned.missions.network import compiled_weights
 from alloc.allocators.learned.missions.play import play, room_for
 from alloc.allocators.learned.missions.situation import MEMORY
 from alloc.allocators.missions.pack import begun, measure, pack
-from alloc.allocators.online.compiled.lead import NAMES, led
+from alloc.allocators.online.compiled.policies import NAMES, final_state
 from alloc.allocators.online.contract import Policy
 from alloc.allocators.online.policies.gappo import NetworkPolicy
 from alloc.allocators.online.policies.outlook import UtilityParameters
@@ -44,7 +44,7 @@ def run_compiled(mission: Mission, policy: Policy, seed: int = 0) -> MissionResu
         room = room_for(mission.instance.n, mission.instance.m, policy.parameters.periods)
         play(state, room, compiled_weights(policy.network), seed)
     elif name in NAMES:
-        state = led(arrays, name, parameters_of(policy), seed, rank_of(mission.instance.agent_ids))
+        state = final_state(arrays, name, parameters_of(policy), seed, rank_of(mission.instance.agent_ids))
     else:
         raise InputError(f"policy {name!r} has no compiled version", "policy")
     return measure(mission, state, name, seed)

@@ -19,7 +19,7 @@ from alloc.allocators.learned.missions.training.curriculum import PackedMission
 from alloc.allocators.learned.missions.training.evolution import restore, state_of
 from alloc.allocators.learned.missions.training.trainer import MissionTrainingParameters
 from alloc.allocators.learned.missions.training.validation import cost_of, figures
-from alloc.allocators.online.compiled.lead import led
+from alloc.allocators.online.compiled.policies import final_state
 from alloc.allocators.online.compiled.run import rank_of
 from alloc.allocators.online.registry import load_policy
 from alloc.problems.errors import InputError
@@ -137,5 +137,5 @@ def _cost(policy: str, parameters: FloatArray, missions: list[tuple[PackedMissio
     rows = []
     for one, seed in missions:
         ranks = rank_of(tuple(f"a{number}" for number in range(1, len(one.arrays.agents) + 1)))
-        rows.append(figures(led(one.arrays, policy, parameters, seed, ranks), one.ideal))
+        rows.append(figures(final_state(one.arrays, policy, parameters, seed, ranks), one.ideal))
     return cost_of(rows)

@@ -4,10 +4,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
-from alloc.allocators.online.planner.picture import News
+from alloc.allocators.online.planner.estimate import News
 from alloc.problems.missions.simulation.state import Order
 
-MOST_CAUSES = 3
+MAX_CAUSES = 3
 """Number of causes that are listed for a change without a specific cause."""
 
 
@@ -74,9 +74,9 @@ def changes_of(
         for kind, subject in (("agent", one.agent), ("task", one.task)):
             if subject is not None:
                 about.setdefault((kind, subject), []).append(one)
-    elsewhere = _told(news)
-    more = f" and {len(elsewhere) - MOST_CAUSES} more" if len(elsewhere) > MOST_CAUSES else ""
-    general = "; ".join(elsewhere[:MOST_CAUSES]) + more if elsewhere else "a better plan was found"
+    events = _descriptions(news)
+    more = f" and {len(events) - MAX_CAUSES} more" if len(events) > MAX_CAUSES else ""
+    general = "; ".join(events[:MAX_CAUSES]) + more if events else "a better plan was found"
     return tuple(
         OrderChange(name, before.get(name), after.get(name), _cause(name, before, after, about) or general)
         for name in changed
@@ -90,17 +90,19 @@ def _cause(
     orders = (before.get(name), after.get(name))
     tasks = [order.task for order in orders if order is not None and order.task is not None]
     return "; ".join(
-        _told([*about.get(("agent", name), ()), *(one for task in tasks for one in about.get(("task", task), ()))])
+        _descriptions(
+            [*about.get(("agent", name), ()), *(one for task in tasks for one in about.get(("task", task), ()))]
+        )
     )
 
 
-def _told(news: Sequence[News]) -> list[str]:
+def _descriptions(news: Sequence[News]) -> list[str]:
     """Return news as text; routine reports only if there is nothing else."""
     major = [one for one in news if not one.is_minor]
-    return list(dict.fromkeys(map(told, major or news)))
+    return list(dict.fromkeys(map(description, major or news)))
 
 
-def told(news: News) -> str:
+def description(news: News) -> str:
     """Return a piece of news as text."""
     subjects = (("agent", news.agent), ("task", news.task))
     subject = "".join(f"{kind} {name} " for kind, name in subjects if name is not None)

@@ -11,11 +11,11 @@ from alloc.allocators.online.contract import Policy
 from alloc.allocators.online.planner import saved
 from alloc.allocators.online.planner.checks import check_hour
 from alloc.allocators.online.planner.collection import collected_later
+from alloc.allocators.online.planner.estimate import StateEstimate
 from alloc.allocators.online.planner.inputs import Input, Report
-from alloc.allocators.online.planner.leader import Decision, Leader
-from alloc.allocators.online.planner.picture import Picture
 from alloc.allocators.online.planner.pins import Pins
 from alloc.allocators.online.planner.plan import OrderChange, Plan, changes_of
+from alloc.allocators.online.planner.policy_runner import Decision, PolicyRunner
 from alloc.allocators.online.registry import load_policy
 from alloc.problems import InputError, Instance, Mission
 from alloc.problems.arguments import of_type, real, text, whole
@@ -70,13 +70,13 @@ class MissionPlanner(AbstractContextManager["MissionPlanner"]):
         self._deadline_s = None if deadline_ms is None else real(deadline_ms, "deadline_ms", above=True) / 1000
         self._seed = whole(seed, "seed", 0, 2**63 - 1)
         self._made_of = (policy if isinstance(policy, str) else None, settings)
-        leader = load_policy(policy, **settings) if isinstance(policy, str) else policy
-        self._picture = Picture(mission if isinstance(mission, Mission) else Mission.from_instance(mission))
-        self._lock, self._pins = threading.RLock(), Pins(self._picture)
+        chosen = load_policy(policy, **settings) if isinstance(policy, str) else policy
+        self._estimate = StateEstimate(mission if isinstance(mission, Mission) else Mission.from_instance(mission))
+        self._lock, self._pins = threading.RLock(), Pins(self._estimate)
         self._plan, self._version, self._planned = Plan(), 0, -1
-        self._told: set[str] = set()
+        self._inputs_this_hour: set[str] = set()
         self._last_s, self._is_closed = 0.0, False
-        self._leader = Leader(leader, self._seed, self._deadline_s, self._picture.state, self._look)
+        self._runner = PolicyRunner(chosen, self._seed, self._deadline_s, self._estimate.state, self._look)
 
     def __exit__(self, *_: object) -> None:
         self.close()
@@ -84,12 +84,12 @@ class MissionPlanner(AbstractContextManager["MissionPlanner"]):
     def close(self) -> None:
         """End the planner's thread; no further plans can be made."""
         self._is_closed = True
-        self._leader.close()
+        self._runner.close()
 
     @property
     def hour(self) -> float:
         """Hour up to which events are known."""
-        return self._picture.state.hour
+        return self._estimate.state.hour
 
     def submit(self, event: Event | Report | Mapping[str, object]) -> None:
         """Submit an event of the mission, or a report of an agent.
@@ -108,13 +108,13 @@ class MissionPlanner(AbstractContextManager["MissionPlanner"]):
         with self._lock:
             given = Input.of(event, self.hour)
             line = repr(given)
-            if line in self._told:
+            if line in self._inputs_this_hour:
                 raise InputError("was submitted before, at the same hour", "event")
             before = self.hour
-            self._picture.take(given)
+            self._estimate.apply(given)
             if self.hour > before:
-                self._told.clear()
-            self._told.add(line)
+                self._inputs_this_hour.clear()
+            self._inputs_this_hour.add(line)
             self._version += 1
 
     def pin(self, agent: str, task: str | None) -> None:
@@ -176,7 +176,7 @@ class MissionPlanner(AbstractContextManager["MissionPlanner"]):
             if self._planned == self._version:
                 return self._plan
             self._follow_late()
-            decision = self._leader.request(self._version, until)
+            decision = self._runner.request(self._version, until)
         decision.done.wait(None if until == math.inf else max(0.0, until - time.perf_counter()))
         woken = min(until, time.perf_counter())
         with self._lock:
@@ -205,8 +205,8 @@ class MissionPlanner(AbstractContextManager["MissionPlanner"]):
                 "seed": self._seed,
                 "pins": self._pins.tasks,
                 "is_planned": self._planned == self._version,
-                "told": sorted(self._told),
-                **saved.document_of(self._picture, self._plan),
+                "told": sorted(self._inputs_this_hour),
+                **saved.document_of(self._estimate, self._plan),
             }
         saved.write(document, path)
 
@@ -228,35 +228,35 @@ class MissionPlanner(AbstractContextManager["MissionPlanner"]):
             If the file cannot be read, or was not written by `save`.
         """
         document = saved.read(path)
-        with saved.told_of(path):
+        with saved.reading(path):
             name, settings = document["policy"], document["settings"]
             if name is None and policy is None:
                 raise InputError("was an object; give it again", "policy")
             given = {} if policy is not None else require_object(settings, "settings")
-            leader = text(name, "policy") if policy is None else policy
+            chosen = text(name, "policy") if policy is None else policy
             deadline_ms, seed = document["deadline_ms"], document["seed"]
-            planner = cls(saved.mission_of(document), leader, deadline_ms, seed=seed, **given)  # type: ignore[arg-type]
-            planner._plan = saved.restored(document, planner._picture)
+            planner = cls(saved.mission_of(document), chosen, deadline_ms, seed=seed, **given)  # type: ignore[arg-type]
+            planner._plan = saved.restored(document, planner._estimate)
             planner._pins.tasks = dict(document["pins"])  # type: ignore[call-overload]
-            planner._told = set(document["told"])  # type: ignore[call-overload]
+            planner._inputs_this_hour = set(document["told"])  # type: ignore[call-overload]
             planner._planned = 0 if document["is_planned"] else -1
         return planner
 
     def _advance(self, hour: float) -> None:
         now = float(real(hour, "hour", 0, LATEST))
-        check_hour(self._picture.state, now)
-        known, before = self._picture.told, self.hour
-        self._picture.advance(now)
+        check_hour(self._estimate.state, now)
+        known, before = self._estimate.news_count, self.hour
+        self._estimate.advance(now)
         if now > before:
-            self._told.clear()
-        if self._picture.told > known:
+            self._inputs_this_hour.clear()
+        if self._estimate.news_count > known:
             self._version += 1
 
     def _look(self, decision: Decision) -> View:
         with self._lock:
             self._pins.lapse()
-            decision.version, decision.seen = self._version, self._picture.told
-            return self._picture.view(self._pins.tasks)
+            decision.version, decision.seen = self._version, self._estimate.news_count
+            return self._estimate.view(self._pins.tasks)
 
     def _until(self) -> float:
         """Return the value of `time.perf_counter` up to which to wait, so that orders are given in time."""
@@ -270,31 +270,31 @@ class MissionPlanner(AbstractContextManager["MissionPlanner"]):
         if decision.is_whole and decision.version <= self._planned:
             return self._plan  # another thread has already applied this decision
         self._follow(dict(decision.orders))
-        picture, before = self._picture, self._plan
-        orders = {agent.facts.id: agent.order for agent in picture.active()}
-        changes = changes_of(before.orders, orders, picture.news)
+        estimate, before = self._estimate, self._plan
+        orders = {agent.facts.id: agent.order for agent in estimate.active()}
+        changes = changes_of(before.orders, orders, estimate.news)
         self._plan = Plan(self.hour, MappingProxyType(orders), decision.is_whole, decision.problem, changes)
         if decision.is_whole:
             self._planned = decision.version
-            picture.forget(decision.seen)
+            estimate.forget(decision.seen)
         return self._plan
 
     def _follow_late(self) -> None:
         """Give orders of a decision that ended after the deadline of the last plan."""
-        late = self._leader.last
+        late = self._runner.last
         if late is not None and self._planned < late.version < self._version:
             self._follow(late.orders)
-            self._leader.last = None
+            self._runner.last = None
 
     def _follow(self, orders: Mapping[str, Order]) -> None:
         """Give the orders that can be followed now, with precedence of pins, and end orders for closed tasks."""
-        picture = self._picture
+        estimate = self._estimate
         self._pins.lapse()
-        for agent in picture.active():
+        for agent in estimate.active():
             name = agent.facts.id
             wanted = self._pins.order(name) or orders.get(name)
             if wanted is not None:
-                picture.order(name, wanted)
-            if (task := agent.order.task) is not None and picture.state.task(task).status is not TaskStatus.OPEN:
-                picture.order(name, STAY)
-        picture.look_ahead()
+                estimate.order(name, wanted)
+            if (task := agent.order.task) is not None and estimate.state.task(task).status is not TaskStatus.OPEN:
+                estimate.order(name, STAY)
+        estimate.schedule()

@@ -8,7 +8,7 @@ from alloc.problems.arguments import shown
 from alloc.problems.errors import InputError, nearest
 from alloc.problems.missions.simulation.state import AgentState, TaskState
 
-MOST_OVER = 200
+MAX_CLOSED = 200
 """Number of the last closed entries that are kept at least; at most twice as many are."""
 
 One = TypeVar("One", AgentState, TaskState)
@@ -50,7 +50,7 @@ class Register(Generic[One]):
     @property
     def is_full(self) -> bool:
         """Whether there are more closed entries than are kept."""
-        return len(self._over) > 2 * MOST_OVER
+        return len(self._over) > 2 * MAX_CLOSED
 
     def find(self, name: str | None) -> One:
         """Return an entry by its id; raise `InputError` if it is unknown."""
@@ -85,7 +85,7 @@ class Register(Generic[One]):
 
     def forget(self, needed: Collection[str | None] = ()) -> None:
         """Forget the closed entries beyond the limit, oldest first, except needed ones."""
-        for name in [*self._over][: max(0, len(self._over) - MOST_OVER)] if self.is_full else ():
+        for name in [*self._over][: max(0, len(self._over) - MAX_CLOSED)] if self.is_full else ():
             if name not in needed:
                 del self._over[name], self._by_id[name]
 

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from dataclasses import fields, replace
 from typing import Any
 
-from alloc.allocators.online.planner.picture import News, Picture
+from alloc.allocators.online.planner.estimate import News, StateEstimate
 from alloc.allocators.online.planner.plan import OrderChange, Plan
 from alloc.problems.errors import InputError
 from alloc.problems.formats.columns import require_format
@@ -35,9 +35,9 @@ AGENT_LEDGERS = ("battery", "capacity", "distance", "energy")
 TASK_LEDGERS = ("left", "since", "appeared", "grown", "done", "cancelled", "missed", "closed")
 
 
-def document_of(picture: Picture, plan: Plan) -> Row:
+def document_of(estimate: StateEstimate, plan: Plan) -> Row:
     """Return the estimated state and the plan as plain objects."""
-    state = picture.state
+    state = estimate.state
     return {
         "hour": state.hour,
         "mission": mission_to_document(state.mission),
@@ -48,7 +48,7 @@ def document_of(picture: Picture, plan: Plan) -> Row:
         },
         "agents": [_agent(agent, state.mission.instance.n) for agent in state.all_agents],
         "tasks": [_task(task, state.mission.instance.m) for task in state.all_tasks],
-        "news": [vars(news) for news in picture.news],
+        "news": [vars(news) for news in estimate.news],
         "plan": {
             "hour": plan.hour,
             "is_new": plan.is_new,
@@ -91,7 +91,7 @@ def read(path: PathLike) -> Row:
 
 
 @contextmanager
-def told_of(path: PathLike) -> Iterator[None]:
+def reading(path: PathLike) -> Iterator[None]:
     """Add the name of the file to errors in its document."""
     try:
         yield
@@ -106,9 +106,9 @@ def mission_of(document: Row) -> Mission:
     return mission_from_document(document["mission"])
 
 
-def restored(document: Row, picture: Picture) -> Plan:
-    """Restore the saved state in the picture of a new planner of the same mission, and return the plan."""
-    state, hour = picture.state, document["hour"]
+def restored(document: Row, estimate: StateEstimate) -> Plan:
+    """Restore the saved state in the estimate of a new planner of the same mission, and return the plan."""
+    state, hour = estimate.state, document["hour"]
     rows = _rows(document["agents"]), _rows(document["tasks"])
     ever, forgotten = require_object(document["ever"]), require_object(document["forgotten"])
     for kind, some in (("agents", rows[0]), ("tasks", rows[1])):
@@ -121,7 +121,7 @@ def restored(document: Row, picture: Picture) -> Plan:
     for row in rows[1]:
         _restore_task(state.task(str(row["id"])), row)
     for row in rows[0]:
-        _restore_agent(picture, state.agent(str(row["id"])), row)
+        _restore_agent(estimate, state.agent(str(row["id"])), row)
     for task in sorted(state.all_tasks, key=lambda task: task.closed):
         state.file_task(task)
     for agent in state.all_agents:
@@ -133,10 +133,10 @@ def restored(document: Row, picture: Picture) -> Plan:
         for agent in workers:
             agent.task = task
     state.hour = float(str(hour))
-    picture.restore_agenda()
-    picture.forget(picture.told)
+    estimate.restore_agenda()
+    estimate.forget(estimate.news_count)
     for row in _rows(document["news"]):
-        picture.tell(News(**row))  # type: ignore[arg-type]
+        estimate.add_news(News(**row))  # type: ignore[arg-type]
     plan = require_object(document["plan"])
     orders = {name: _order(row) for name, row in require_object(plan["orders"]).items()}
     changes = tuple(
@@ -148,11 +148,11 @@ def restored(document: Row, picture: Picture) -> Plan:
     return Plan(float(str(plan["hour"])), found, bool(plan["is_new"]), problem, changes)
 
 
-def _agent(agent: AgentState, begun_with: int) -> Row:
+def _agent(agent: AgentState, initial_count: int) -> Row:
     flight = agent.flight
     return {
         "id": agent.facts.id,
-        **_came(agent, begun_with),
+        **_origin(agent, initial_count),
         "status": str(agent.status),
         "place": _place(agent.place),
         "order": order_to_row(agent.order),
@@ -170,10 +170,10 @@ def _agent(agent: AgentState, begun_with: int) -> Row:
     }
 
 
-def _task(task: TaskState, begun_with: int) -> Row:
+def _task(task: TaskState, initial_count: int) -> Row:
     return {
         "id": task.facts.id,
-        **_came(task, begun_with),
+        **_origin(task, initial_count),
         "status": str(task.status),
         "appears": task.facts.appears,
         "begun": task.begun,
@@ -183,9 +183,9 @@ def _task(task: TaskState, begun_with: int) -> Row:
     }
 
 
-def _came(one: AgentState | TaskState, begun_with: int) -> Row:
+def _origin(one: AgentState | TaskState, initial_count: int) -> Row:
     """Return the facts of an agent or a task that is not part of the mission, as it came later."""
-    if one.index < begun_with:
+    if one.index < initial_count:
         return {}
     facts = {field.name: _plain(getattr(one.facts, field.name)) for field in fields(one.facts)}
     workload = {"workload": one.workload} if isinstance(one, TaskState) else {}
@@ -254,14 +254,14 @@ def _restore_task(task: TaskState, row: Row) -> None:
     _restore_ledgers(task, row, TASK_LEDGERS)
 
 
-def _restore_agent(picture: Picture, agent: AgentState, row: Row) -> None:
+def _restore_agent(estimate: StateEstimate, agent: AgentState, row: Row) -> None:
     agent.status, agent.place = AgentStatus(str(row["status"])), _to_place(row["place"])
     order, flight = _order(row["order"]), row["flight"]
     assert order is not None
     agent.order, agent.flight, agent.task = order, None, None
     if flight is not None:
         said = require_object(flight)
-        task = None if said["task"] is None else picture.state.task(str(said["task"]))
+        task = None if said["task"] is None else estimate.state.task(str(said["task"]))
         hours = (float(str(said[name])) for name in ("distance", "departs", "arrives"))
         agent.flight = Flight(_to_place(said["source"]), _to_place(said["goal"]), task, *hours)
     _restore_ledgers(agent, row, AGENT_LEDGERS)

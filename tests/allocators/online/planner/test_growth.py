@@ -7,7 +7,7 @@ import threading
 import pytest
 
 from alloc.allocators import MissionPlanner
-from alloc.allocators.online.planner import leader, picture, register
+from alloc.allocators.online.planner import estimate, policy_runner, register
 from alloc.allocators.online.routes import describe, tables
 from alloc.problems import InputError, Instance
 from alloc.problems.changes.remove import replaced
@@ -44,7 +44,7 @@ class Steps:
 @pytest.fixture
 def few(monkeypatch):
     """Limit the number of closed entries that are kept."""
-    for module, name in ((register, "MOST_OVER"), (leader, "MOST_OVER"), (picture, "MOST_NEWS")):
+    for module, name in ((register, "MAX_CLOSED"), (policy_runner, "MAX_CLOSED"), (estimate, "MAX_NEWS")):
         monkeypatch.setattr(module, name, FEW)
 
 
@@ -100,9 +100,9 @@ def test_costs_do_not_grow_with_closed_tasks_and_agents(few, policy, tmp_path):
     assert late[0] < 1.1 * early[0]
     assert late[1] < early[1] + 400
     assert late[2] < 1.1 * early[2]
-    known = planner._picture.state
+    known = planner._estimate.state
     assert max(len(known.all_agents), len(known.all_tasks)) <= 3 + 2 * FEW + 1
-    assert len(planner._leader._agents) <= 3 + 2 * (3 + FEW)
+    assert len(planner._runner._agents) <= 3 + 2 * (3 + FEW)
 
 
 def test_oldest_closed_tasks_are_forgotten(few, tmp_path):
@@ -119,7 +119,7 @@ def test_oldest_closed_tasks_are_forgotten(few, tmp_path):
                     one.submit({"event": "task-appears", "task": {"id": "t36", "workload": 1}})
                 one.submit({"event": "task-changes", "task": "t36", "workload": 1})
                 one.submit({"event": "task-appears", "task": {"id": "t2", "workload": 1, "position": [0, 0]}})
-            assert [task.facts.id for task in again._picture.state.tasks] == ["t36", "t37", "t38", "t39", "t2"]
+            assert [task.facts.id for task in again._estimate.state.tasks] == ["t36", "t37", "t38", "t39", "t2"]
             assert again.plan() == planner.plan()
             for number in range(40, 45):
                 exchange(planner, number)
@@ -148,9 +148,9 @@ def test_number_of_news_between_plans_is_limited(few):
         planner.plan()
         for number in range(40):
             planner.submit({"hour": 0.1 + number / 100, "event": "task-changes", "task": "t0", "workload": 9 + number})
-        assert len(planner._picture.news) <= 2 * FEW
+        assert len(planner._estimate.news) <= 2 * FEW
         planner.plan()
-        assert planner._picture.news == []
+        assert planner._estimate.news == []
 
 
 def test_routes_forgets_closed_tasks(few, monkeypatch):
@@ -163,7 +163,7 @@ def test_routes_forgets_closed_tasks(few, monkeypatch):
     with MissionPlanner(instance, "nearest", None) as planner:
         for number in range(3, 60):
             exchange(planner, number)
-            view = planner._picture.view({})
+            view = planner._estimate.view({})
             assert describer.describe(view, describe.Foresight()) is not None
     assert len(describer._begun) + len(describer._seen) <= 2 * (4 + FEW)
     assert len(describer._tables._ways) <= 4 * (4 * 4 + FEW) + 4 * 4

@@ -58,7 +58,7 @@ def test_conservation_laws_hold_and_plans_are_restored(tmp_path):
                     continue
                 plan = planner.plan()
                 assert plan.problem is None
-                conservation.check(planner._picture.state)
+                conservation.check(planner._estimate.state)
             planner.save(tmp_path / "planner.json")
             with MissionPlanner.restore(tmp_path / "planner.json") as again:
                 assert again.plan(mission.horizon) == planner.plan(mission.horizon)
@@ -71,4 +71,4 @@ def test_small_growing_work_is_accounted_for():
     with MissionPlanner(Mission(instance, growth=[0.7]), "idle", None) as planner:
         planner.submit({"event": "task-changes", "task": instance.task_ids[0], "workload": 1e-12})
         planner.plan(7.8)
-        conservation.check(planner._picture.state)
+        conservation.check(planner._estimate.state)

@@ -107,7 +107,7 @@ def test_work_that_was_not_done_by_the_deadline_is_missed(pair):
         assert planner.plan(3.5)["ann"] != Order("t1")  # it is done at 3
         planner.submit({"hour": 5.0, "event": "task-changes", "task": "t1", "workload": 1.0})
         assert planner.plan()["ann"] != Order("t1")
-        assert planner._picture.state.task("t1").missed == 1.0
+        assert planner._estimate.state.task("t1").missed == 1.0
 
 
 @pytest.mark.parametrize("policy", ["greedy", "hedonic"])
@@ -185,7 +185,7 @@ def test_obsolete_entries_are_dropped(pair):
         for step in range(40):
             planner.submit(Report(step / 1000, "ann", battery=19))
             assert planner.plan().is_new
-            assert len(planner._picture.agenda) <= 4 * 4
+            assert len(planner._estimate.agenda) <= 4 * 4
     assert not any(seen)
     assert gc.isenabled()
 

@@ -45,7 +45,7 @@ def crowd(rng: np.random.Generator) -> Mission:
 
 def told(planner: MissionPlanner, rng: np.random.Generator, step: int) -> dict[str, object]:
     """Return a random event."""
-    agents, tasks = list(planner._picture.state.all_agents), list(planner._picture.state.all_tasks)
+    agents, tasks = list(planner._estimate.state.all_agents), list(planner._estimate.state.all_tasks)
     agent, task = rng.choice(agents).facts.id, rng.choice(tasks).facts.id
     return [
         {"event": "agent-recalled", "agent": agent},
@@ -90,7 +90,7 @@ def test_agents_without_a_turn_have_not_decided() -> None:
         with MissionPlanner(crowd(np.random.default_rng(1)), "gappo", None) as planner:
             planner.plan()
             planner.submit({"event": "task-appears", "task": {"id": "new", "workload": 7.0, "position": [0.5, 0.5]}})
-            turns, view = planner._leader._turns, planner._picture.view({})
+            turns, view = planner._runner._turns, planner._estimate.view({})
             assert turns is not None
             if is_broken_off:
                 started = turns.turns(view, list(view.agents))

@@ -13,8 +13,8 @@ from alloc.allocators.missions.layout import MESSAGES, NOBODY, OVER, TO_TASK, Mi
 from alloc.allocators.missions.orders import order
 from alloc.allocators.missions.pack import begun
 from alloc.allocators.online.compiled.auction import bid
+from alloc.allocators.online.compiled.exploring import explore
 from alloc.allocators.online.compiled.hedonic import join
-from alloc.allocators.online.compiled.looking import look_around
 from alloc.allocators.online.compiled.notes import BIDS, PARTITION, Notes, hear, notes_for, send
 from alloc.allocators.online.compiled.utility import best_task, fill_with
 from alloc.allocators.runtime.compiled import compiled_in_place
@@ -52,22 +52,22 @@ def nearest(state: MissionArrays, number: int, room: Room) -> int:
 
 @compiled_in_place
 def choose(
-    state: MissionArrays, number: int, room: Room, leader: int, parameters: FloatArray, memory: Memory, seed: int
+    state: MissionArrays, number: int, room: Room, policy_code: int, parameters: FloatArray, memory: Memory, seed: int
 ) -> int:
     """Return the task that an agent is to go to, -1 for none."""
-    if leader == GREEDY:
+    if policy_code == GREEDY:
         fill_with(state, number, room.situation, parameters[1], memory.none)
         return best_task(room, int(room.situation.own[known.TARGET]), parameters)
-    if leader == HEDONIC:
+    if policy_code == HEDONIC:
         return join(state, number, room, parameters, memory.notes, seed, memory.moves)
-    if leader == AUCTION:
+    if policy_code == AUCTION:
         return bid(state, number, room, parameters, memory.notes, memory.rank)
     return nearest(state, number, room)
 
 
 @compiled_in_place
-def lead(
-    state: MissionArrays, room: Room, leader: int, kind: int, parameters: FloatArray, memory: Memory, seed: int
+def run_to_end(
+    state: MissionArrays, room: Room, policy_code: int, kind: int, parameters: FloatArray, memory: Memory, seed: int
 ) -> None:
     """Run a mission to its end under a policy; `kind` is that of its notes, 0 for none."""
     head, key = state.head[0], keyed(first_key(EXPLORING), seed)
@@ -83,16 +83,16 @@ def lead(
             continue
         for place in range(head.deciding):
             number = state.deciding[place]
-            if leader == NEAREST and state.agents[number].order == TO_TASK and is_busy(state, number):
+            if policy_code == NEAREST and state.agents[number].order == TO_TASK and is_busy(state, number):
                 continue
-            task = choose(state, number, room, leader, parameters, memory, seed)
+            task = choose(state, number, room, policy_code, parameters, memory, seed)
             if task >= 0:
                 order(state, number, TO_TASK, task, (0.0, 0.0, 0.0))
             else:
-                look_around(state, number, key, memory.drawn)
+                explore(state, number, key, memory.drawn)
 
 
-def led(arrays: MissionArrays, policy: str, parameters: FloatArray, seed: int, rank: IntArray) -> MissionArrays:
+def final_state(arrays: MissionArrays, policy: str, parameters: FloatArray, seed: int, rank: IntArray) -> MissionArrays:
     """Run a mission to its end under a policy, and return its final state.
 
     Parameters
@@ -108,9 +108,9 @@ def led(arrays: MissionArrays, policy: str, parameters: FloatArray, seed: int, r
     rank : ndarray of int, shape (n,)
         Rank of each agent's id in alphabetical order.
     """
-    state, leader = begun(arrays, seed), NAMES.index(policy)
+    state, policy_code = begun(arrays, seed), NAMES.index(policy)
     n, m, slots = len(state.agents), len(state.tasks), len(state.sent)
     none = np.zeros(n, np.intp)
-    memory = Memory(notes_for(NOTES[leader], n, slots), none, none.copy(), rank, np.zeros(0))
-    lead(state, room_for(n, m), leader, NOTES[leader], parameters, memory, seed)
+    memory = Memory(notes_for(NOTES[policy_code], n, slots), none, none.copy(), rank, np.zeros(0))
+    run_to_end(state, room_for(n, m), policy_code, NOTES[policy_code], parameters, memory, seed)
     return state

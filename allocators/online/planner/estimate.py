@@ -36,11 +36,11 @@ WORDS = {
 }
 
 
-MOST_ENTRIES = 4
+MAX_ENTRIES = 4
 """Number of agenda entries per agent and task after which the agenda is rebuilt; at most two of them are not void."""
 
 
-MOST_NEWS = 1000
+MAX_NEWS = 1000
 """Smallest number of news since the last plan that are kept."""
 
 
@@ -65,7 +65,7 @@ class News:
     is_minor: bool = False
 
 
-class Picture:
+class StateEstimate:
     """The estimated present state of agents and tasks.
 
     Agents are assumed to follow their orders, and work to proceed as in the simulation of missions, until an event or a
@@ -82,7 +82,7 @@ class Picture:
     state : LiveState
     news : list of News
         News in chronological order, until they are forgotten.
-    told : int
+    news_count : int
         Total number of news so far, including forgotten ones.
     """
 
@@ -90,24 +90,24 @@ class Picture:
         self.state = LiveState(mission)
         self.agenda = Agenda()
         self.news: list[News] = []
-        self.told = 0
+        self.news_count = 0
         self._changes = Changes(self.state, self.agenda)
         for event in mission.timeline:
             if event.hour <= 0 and event.kind is not EventKind.RADIO_SILENT:
-                self._apply(event)
+                self._apply_event(event)
         self._changes.balance()
-        self._tell("the mission began")
+        self._note("the mission began")
 
     def advance(self, hour: float) -> None:
         """Advance to an hour: flights end, work gets done, deadlines pass."""
         state = self.state
         while self.agenda.hour <= hour:
             state.hour = max(state.hour, self.agenda.hour)
-            self._take(self.agenda.pop()[1])
+            self._process(self.agenda.pop()[1])
             self._changes.balance()
         state.hour = hour
 
-    def take(self, given: Input) -> None:
+    def apply(self, given: Input) -> None:
         """Apply an input at its hour; an inconsistent one is an error and changes nothing."""
         said = given.said
         check_hour(self.state, said.hour)
@@ -122,20 +122,20 @@ class Picture:
             check_report(self.state, said)
         self.advance(said.hour)
         if isinstance(said, Event):
-            self._apply(said)
+            self._apply_event(said)
             is_minor = said.kind is EventKind.TASK_CHANGES
-            self.tell(News(said.hour, WORDS[said.kind], said.agent, said.task, is_minor))
+            self.add_news(News(said.hour, WORDS[said.kind], said.agent, said.task, is_minor))
         else:
             agent = self.state.agent(said.agent)
             left = agent.task
             problem = correct(self.state, agent, said)
             self._changes.note_agent(agent, left)
             text = "reported" if problem is None else f"cannot go on: {problem}"
-            self.tell(News(said.hour, text, said.agent, is_minor=problem is None))
+            self.add_news(News(said.hour, text, said.agent, is_minor=problem is None))
         self._changes.balance()
 
     def order(self, name: str, order: Order) -> str | None:
-        """Give an agent an order; return why it is refused, None if it is not. Call `look_ahead` after the last one."""
+        """Give an agent an order; return why it is refused, None if it is not. Call `schedule` after the last one."""
         agent = self.state.agent(name)
         if order == agent.order:
             return None
@@ -152,10 +152,10 @@ class Picture:
             self._changes.note_agent(agent, left)
         return problem
 
-    def look_ahead(self) -> None:
+    def schedule(self) -> None:
         """Schedule arrivals and completions after new orders."""
         self._changes.balance()
-        if len(self.agenda) > MOST_ENTRIES * (len(self.state.agents) + len(self.state.tasks)):
+        if len(self.agenda) > MAX_ENTRIES * (len(self.state.agents) + len(self.state.tasks)):
             self.agenda = Agenda()  # drops void entries of diverted agents
             self._changes = Changes(self.state, self.agenda)
             self.restore_agenda()
@@ -212,21 +212,21 @@ class Picture:
                 if hour < math.inf:
                     self.agenda.push(max(hour, self.state.hour), Turn.COMPLETION, Completion(task, task.version))
 
-    def tell(self, news: News) -> None:
+    def add_news(self, news: News) -> None:
         """Add a piece of news."""
         self.news.append(news)
-        self.told += 1
-        if len(self.news) > 2 * MOST_NEWS:
-            del self.news[:-MOST_NEWS]  # no plan was made for long, or the policy fails
+        self.news_count += 1
+        if len(self.news) > 2 * MAX_NEWS:
+            del self.news[:-MAX_NEWS]  # no plan was made for long, or the policy fails
 
     def forget(self, count: int) -> None:
         """Forget the first `count` of all news so far."""
-        del self.news[: max(0, len(self.news) - (self.told - count))]
+        del self.news[: max(0, len(self.news) - (self.news_count - count))]
 
-    def _tell(self, text: str, agent: str | None = None, task: str | None = None) -> None:
-        self.tell(News(self.state.hour, text, agent, task))
+    def _note(self, text: str, agent: str | None = None, task: str | None = None) -> None:
+        self.add_news(News(self.state.hour, text, agent, task))
 
-    def _apply(self, event: Event) -> None:
+    def _apply_event(self, event: Event) -> None:
         state = self.state
         if event.kind is EventKind.RADIO_SILENT:
             return
@@ -257,14 +257,14 @@ class Picture:
         if task.status in (TaskStatus.TO_COME, TaskStatus.OPEN) and task.facts.deadline < math.inf:
             self.agenda.push(task.facts.deadline, Turn.DEADLINE, task)
 
-    def _take(self, item: object) -> None:
+    def _process(self, item: object) -> None:
         """Process an entry of the agenda, unless it is void by now."""
         if isinstance(item, Arrival):
             if item.agent.flight is item.flight:
                 land(self.state, item.agent)
                 self._changes.note_agent(item.agent, item.flight.task)
                 if item.agent.status is AgentStatus.IDLE:
-                    self._tell("arrived", agent=item.agent.facts.id)
+                    self._note("arrived", agent=item.agent.facts.id)
         elif isinstance(item, Completion):
             if item.task.status is TaskStatus.OPEN and item.task.version == item.version:
                 self._close(item.task, TaskStatus.DONE)
@@ -278,4 +278,4 @@ class Picture:
         self._changes.note_task(task)
         for agent in workers:
             self._changes.note_agent(agent)
-        self._tell(f"was {status}", task=task.facts.id)
+        self._note(f"was {status}", task=task.facts.id)

@@ -9,7 +9,7 @@ from queue import SimpleQueue
 from types import MappingProxyType
 
 from alloc.allocators.online.contract import AgentDecider, Briefing, FleetDecider, Policy, PolicyError
-from alloc.allocators.online.planner.register import MOST_OVER
+from alloc.allocators.online.planner.register import MAX_CLOSED
 from alloc.allocators.online.planner.state import LiveState
 from alloc.problems.missions.simulation.reports import AgentReport, View
 from alloc.problems.missions.simulation.state import STAY, AgentStatus, Order
@@ -60,7 +60,7 @@ class Decision:
         return self.version not in (-1, version) or (self.is_overdue and not is_over)
 
 
-class Leader:
+class PolicyRunner:
     """Runs the decisions of a policy in a worker thread, one at a time.
 
     Parameters
@@ -169,7 +169,7 @@ class Leader:
 
     def _forget_deciders(self, count: int) -> None:
         """Drop the deciders of forgotten agents once there are far more deciders than agents."""
-        if len(self._agents) > 2 * (count + MOST_OVER):
+        if len(self._agents) > 2 * (count + MAX_CLOSED):
             known = self._state.all_agents
             self._agents = {name: decider for name, decider in self._agents.items() if name in known}
 

@@ -20,7 +20,7 @@ def draw(area: FloatArray, axis: int, number: int, key: int, drawn: IntArray) ->
 
 
 @compiled_in_place
-def look_around(state: MissionArrays, number: int, key: int, drawn: IntArray) -> None:
+def explore(state: MissionArrays, number: int, key: int, drawn: IntArray) -> None:
     """Send an agent that knows of nothing to do to a random place, as `Explorer` does.
 
     Parameters
