@@ -102,16 +102,16 @@ def plan_command(
 
 
 def serve(lines: "Lines") -> None:
-    """Answer all lines until the input ends or a signal arrives, and save the planner."""
+    """Answer all lines until the input ends, a signal arrives or an answer cannot be written, and save the planner."""
     arrived: SimpleQueue[str | None] = SimpleQueue()
     threading.Thread(target=read_lines, args=(arrived,), name="alloc-lines", daemon=True).start()
     with ended_by_signals(arrived):
-        number = 0
-        while (line := arrived.get()) is not None:
-            number += 1
-            write_out(json.dumps(lines.answer(line, number), allow_nan=False) + "\n")
-        lines.save()
-    lines.close()
+        try:
+            for number, line in enumerate(iter(arrived.get, None), 1):
+                write_out(json.dumps(lines.answer(line, number), allow_nan=False) + "\n")
+        finally:  # also if an answer cannot be written
+            lines.save()
+            lines.close()
 
 
 def read_lines(arrived: "SimpleQueue[str | None]") -> None:

@@ -1,6 +1,6 @@
 """``alloc simulate``."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Annotated
 
@@ -8,13 +8,13 @@ import typer
 
 from alloc.cli import options
 from alloc.cli.options import examples
-from alloc.cli.output.console import STANDARD, note, say, write_json
-from alloc.cli.output.files import check_film, check_outputs, check_picture
+from alloc.cli.output.console import STANDARD, note, say, to_json
+from alloc.cli.output.files import check_film, check_outputs, check_picture, save
 from alloc.problems.vocabulary import Knowledge
 
 if TYPE_CHECKING:
     from alloc.allocators import MissionRun, Policy
-    from alloc.problems import Course, Mission, MissionResult
+    from alloc.problems import Course, Mission, MissionLog, MissionResult
 
 EXAMPLES = examples(
     "alloc simulate mission.json --policy nearest",
@@ -24,7 +24,7 @@ EXAMPLES = examples(
     "alloc simulate mission.json --policy auction --runs 10 --json",
     "alloc generate mission --seed 7 --output - | alloc simulate - --policy hedonic",
     closing="Exit code 0 if all tasks are done in all runs, 1 if not. An instance is a mission without "
-    "events. Ctrl-C ends --runs; complete ones are printed, with exit code 1.",
+    "events. Ctrl-C and SIGTERM end --runs; complete ones are printed, with exit code 1.",
 )
 
 
@@ -74,41 +74,46 @@ def simulate_command(
     Allocation continues over time as tasks appear and are done, and agents fail and join.
     """
     from alloc.allocators import simulate
-    from alloc.problems import Recorder, read_mission, write_log
+    from alloc.problems import Recorder, read_mission
 
     check_files(mission, runs, {"--log": log, "--plot": plot, "--animate": animate})
     if log == STANDARD and json:
         raise typer.BadParameter("cannot go to standard output together with --json", param_hint="'--log'")
     problem = read_mission(mission)
     leader = load(policy, settings, knowledge or problem.knowledge)
-    results: list[MissionResult] = []
     recorder = Recorder(with_knowledge=animate is not None) if plot or animate else None
     lead = partial(simulate, problem, leader, knowledge=knowledge, deadline_ms=deadline_ms or None, observe=recorder)
-    for run in until_interrupted(lead, range(seed, seed + runs)):
-        results.append(run.result)
-    if json:
-        write_json(results[0].to_dict() if runs == 1 else [result.to_dict() for result in results])
-    if not quiet:
-        tell(results, problem, summary=not json)
-        if len(results) < runs:
-            note(f"interrupted after {len(results)} of {runs} runs")
-    if log is not None:  # there is a single run
-        write_log(run.log, log)
+    results, last = until_interrupted(lead, range(seed, seed + runs))
+
+    def figures() -> str:
+        return to_json(results[0].to_dict() if runs == 1 else [result.to_dict() for result in results])
+
+    then: list[Callable[[], object]] = [] if quiet else [lambda: tell(results, problem, runs, summary=not json)]
     if recorder is not None:
-        draw(recorder.course(results[0]), plot, animate)
+        then.append(lambda: draw(recorder.course(results[0]), plot, animate))
+    save(figures if log is None else last.to_text, log, figures if json else None, then)
     raise typer.Exit(0 if len(results) == runs and all(result.is_done for result in results) else 1)
 
 
-def until_interrupted(lead: "Callable[..., MissionRun]", seeds: Sequence[int]) -> "Iterator[MissionRun]":
-    """Make a run with each seed; after the first one, Ctrl-C ends the iteration without an error."""
-    for done, seed in enumerate(seeds):
-        try:
-            run = lead(seed=seed)
-        except KeyboardInterrupt:
-            if not done:
-                raise
-            return
-        yield run
+def until_interrupted(
+    lead: "Callable[..., MissionRun]", seeds: Sequence[int]
+) -> "tuple[list[MissionResult], MissionLog]":
+    """Make a run with each seed, and return the results and the log of the last one.
+
+    After the first run, Ctrl-C and SIGTERM skip the remaining ones without an error.
+    """
+    from alloc.allocators.runtime.interrupts import sigterm_interrupts
+
+    results: list[MissionResult] = []
+    try:
+        with sigterm_interrupts():
+            for seed in seeds:
+                run = lead(seed=seed)
+                results.append(run.result)
+    except KeyboardInterrupt:
+        if not results:
+            raise
+    return results, run.log
 
 
 def load(policy: str, settings: list[str] | None, knowledge: Knowledge) -> "Policy":
@@ -140,8 +145,8 @@ def draw(course: "Course", plot: str | None, animate: str | None) -> None:
         animate_mission(course, animate)
 
 
-def tell(results: "list[MissionResult]", mission: "Mission", *, summary: bool) -> None:
-    """Print the measures of runs, and notes on late and refused orders."""
+def tell(results: "list[MissionResult]", mission: "Mission", runs: int, *, summary: bool) -> None:
+    """Print the measures of runs, and notes on late and refused orders and on an interruption."""
     from alloc.cli.output.mission import lines, rows
 
     if summary:
@@ -152,3 +157,5 @@ def tell(results: "list[MissionResult]", mission: "Mission", *, summary: bool) -
     refused = sum(result.orders_refused for result in results)
     if refused:
         note(f"{refused} orders could not be carried out; --log says which and why")
+    if len(results) < runs:
+        note(f"interrupted after {len(results)} of {runs} runs")

@@ -1,11 +1,8 @@
 """``alloc train``."""
 
-import signal
-import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from types import FrameType
 from typing import TYPE_CHECKING
 
 import typer
@@ -76,13 +73,15 @@ def train_command(
     """
     state, lines = _files(output, checkpoint, log, init)
     from alloc.allocators.parallel.engines import check_engine, make_engine
+    from alloc.allocators.runtime.interrupts import sigterm_interrupts
 
     check_engine(engine.value, workers, address)
     if missions is not None:
         check_no_games(family=family, instances=instances, turn=turn, reward=reward)
     problems = None if instances is None else read_instances(instances)
     progress, size = Progress(problems or []), former_generation_steps or generation_steps
-    with _failures_told(state, progress), make_engine(engine.value, workers, address, threads) as where, _interrupts():
+    engines = make_engine(engine.value, workers, address, threads)
+    with _failures_told(state, progress), engines as where, sigterm_interrupts():
         shared = Shared(
             steps=steps,
             minutes=minutes,
@@ -212,20 +211,3 @@ class Progress:
             f"{policy} contains the networks of generation {best.generation}: T {best.time:.4f},"
             f" distance {best.distance:.4f}, {number(best.unserved, 3)} tasks unserved"
         )
-
-
-@contextmanager
-def _interrupts() -> Iterator[None]:
-    """Treat SIGTERM as Ctrl-C; both may interrupt at any time, as files are replaced atomically."""
-
-    def interrupt(_number: int, _frame: FrameType | None) -> None:
-        raise KeyboardInterrupt
-
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    before = signal.signal(signal.SIGTERM, interrupt)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, before)

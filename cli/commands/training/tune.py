@@ -64,9 +64,12 @@ def tune_command(
         learner=learner,
         curriculum=Curriculum(families),
     )
+    from alloc.allocators.runtime.interrupts import sigterm_interrupts
+
     opened = open_study(Path(study), method, seed)
     try:
-        tune(opened, parameters, trials, Limits(steps=steps), seed=seed, on_trial=_tell)
+        with sigterm_interrupts():
+            tune(opened, parameters, trials, Limits(steps=steps), seed=seed, on_trial=_tell)
     except KeyboardInterrupt:
         note(f"interrupted; {study} holds {len(opened.trials)} trials")
     try:

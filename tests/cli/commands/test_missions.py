@@ -1,5 +1,6 @@
 import importlib
 import json
+import signal
 from pathlib import Path
 
 import pytest
@@ -43,14 +44,15 @@ def test_several_runs_are_a_list(alloc, mission):
     assert [result["seed"] for result in ran.json] == [0, 1, 2]
 
 
-def test_ctrl_c_keeps_the_runs_that_are_complete(alloc, mission, monkeypatch):
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_keeps_the_runs_that_are_complete(alloc, mission, monkeypatch, number):
     """Of several runs those before it are printed, with exit code 1; in the first there is nothing to print."""
     module = importlib.import_module("alloc.allocators.online.run")
     inner = module.simulate_until
 
     def until_third(*arguments, **settings):
         if arguments[4] == last:
-            raise KeyboardInterrupt
+            signal.raise_signal(number)
         return inner(*arguments, **settings)
 
     monkeypatch.setattr(module, "simulate_until", until_third)
@@ -73,6 +75,19 @@ def test_unwritable_log_keeps_the_result(alloc, mission, monkeypatch):
     ran = alloc("simulate", mission, "--policy", "greedy", "--json", "--log", "run.jsonl")
     assert (ran.code, ran.json["status"], Path("run.jsonl").exists()) == (2, "done", False)
     assert ran.err == "alloc: run.jsonl: cannot be written: no space left on device\n"
+
+
+def test_standard_output_that_cannot_be_written_costs_no_log(alloc, mission, monkeypatch):
+    """The log and the picture of a run are written although its result cannot be printed, with exit code 2."""
+
+    def fail(_):
+        raise OSError(28, "cannot be written: no space left on device", "standard output")
+
+    monkeypatch.setattr("alloc.cli.output.files.write_out", fail)
+    ran = alloc("simulate", mission, "--policy", "greedy", "--json", "-q", "--log", "run.jsonl", "--plot", "run.svg")
+    assert (ran.code, ran.err) == (2, "alloc: standard output: cannot be written: no space left on device\n")
+    assert Path("run.svg").exists()
+    assert alloc("replay", "run.jsonl", "-q").code == 0
 
 
 def test_exit_codes_match_solve(alloc, mission):

@@ -119,6 +119,21 @@ def test_planning_resumes_from_saved_state(alloc, pair):
     assert "planning resumes from state.json" in ran.err
 
 
+def test_the_state_is_saved_if_an_answer_cannot_be_written(alloc, pair, monkeypatch):
+    """With standard output on a full disk the run ends with exit code 2, and the state has the line before it."""
+
+    def fail(_):
+        raise OSError(28, "cannot be written: no space left on device", "standard output")
+
+    arguments = ("plan", "--stdio", "--policy", "nearest", "--state", "state.json")
+    with monkeypatch.context() as patch:
+        patch.setattr("alloc.cli.commands.missions.plan.write_out", fail)
+        ran = alloc(*arguments, "pair.json", stdin=lines({"event": "agent-fails", "agent": "ann", "hour": 1}))
+    assert (ran.code, ran.err) == (2, "alloc: standard output: cannot be written: no space left on device\n")
+    again = alloc(*arguments, stdin=lines({"request": "plan"}))
+    assert orders(answers(again.out)[0]) == {"ben": "t2"}
+
+
 def test_wrong_arguments_are_refused_before_any_line(alloc, pair):
     """An unknown policy or file gives one line and exit code 2."""
     for arguments, told in (
