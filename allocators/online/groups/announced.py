@@ -1,8 +1,11 @@
 """Routes that were planned for agents, as announced in messages."""
 
 import math
-from collections.abc import Sequence, Set
+from collections.abc import Collection, Sequence, Set
 from dataclasses import dataclass
+
+MOST_GONE = 200
+"""Smallest number of routes of agents that are no longer known that are kept."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,12 +86,35 @@ class Announced:
         A task belongs to the newest route that contains it. A route is valid until its end plus `patience` times its
         planned duration.
         """
+        owners = self._owners(group, hour, patience)
+        return {name: until for name, (_, until, agent) in owners.items() if agent not in group}
+
+    def forget(self, known: Collection[str], tasks: Collection[str], hour: float, patience: float) -> None:
+        """Drop the routes of unknown agents to which no open task belongs, once there are far more than known agents.
+
+        Parameters
+        ----------
+        known : collection of str
+            Agents that are known.
+        tasks : collection of str
+            Open tasks.
+        hour, patience : float
+            As for `taken`.
+        """
+        if len(self.routes) <= 2 * (len(known) + MOST_GONE):
+            return
+        owners = self._owners(frozenset(), hour, patience)
+        needed = {agent for name, (_, _, agent) in owners.items() if name in tasks}
+        self.routes = {name: route for name, route in self.routes.items() if name in known or name in needed}
+
+    def _owners(self, group: Set[str], hour: float, patience: float) -> dict[str, tuple[float, float, str]]:
+        """Return the newest route of each task: its hour, the hour at which the task is to be done, and the agent."""
         newest: dict[str, tuple[float, float, str]] = {}
         for agent, route in self.routes.items():
             if agent in group or hour <= route.end + patience * (route.end - route.hour):
                 for name, until in route.visits:
                     newest[name] = max(newest.get(name, (-math.inf, 0.0, "")), (route.hour, until, agent))
-        return {name: until for name, (_, until, agent) in newest.items() if agent not in group}
+        return newest
 
     def joined(self, group: Sequence[str]) -> dict[str, list[str]]:
         """Return the routes of a group; where several plans contain a task, the one that finishes it first keeps it."""

@@ -77,6 +77,8 @@ class _Planner(AgentDecider):
         """Return the first task of the agent's route, after planning anew if agents or tasks have changed."""
         for message in view.heard:
             self._announced.hear(message.notes)
+        open_tasks = {name for name, task in view.tasks.items() if task.status is TaskStatus.OPEN}
+        self._announced.forget(view.agents.keys(), open_tasks, view.hour, self._parameters.patience)
         self._lookout.note(view)
         group = in_contact(view, self._radius, view.hour - self._contact)
         is_planner = self._is_alone or group[0] == view.id

@@ -5,6 +5,7 @@ import pytest
 
 from alloc.allocators import simulate
 from alloc.allocators.online.contract import Briefing
+from alloc.allocators.online.groups import announced as announced_routes
 from alloc.allocators.online.groups.announced import Announced, Route
 from alloc.allocators.online.groups.contact import in_contact
 from alloc.allocators.online.policies.local_routes import LocalRoutes
@@ -79,6 +80,19 @@ def test_tasks_in_current_routes_of_others_are_left_to_them():
     assert known.taken({"a2"}, 3.0, 1.0) == {"t1": 3.0}
     assert known.taken({"a3"}, 8.0, 1.0) == {"t1": 3.0, "t2": 5.0}
     assert known.taken({"a3"}, 10.0, 1.0) == {}
+
+
+def test_only_routes_that_reserve_open_tasks_for_unknown_agents_are_kept(monkeypatch):
+    """Nothing is forgotten within the limit; beyond it, what is dropped reserves no open task."""
+    routes = {"a1": EARLY, "a2": LATE, "a3": Route(0.0, "a3", (("t2", 9.0),)), "a4": Route(0.0, "a4", (("t4", 9.0),))}
+    known = announced(**routes)
+    known.forget({"a4"}, {"t1", "t2"}, 3.0, 1.0)
+    assert known.routes == routes
+    monkeypatch.setattr(announced_routes, "MOST_GONE", 0)
+    taken = known.taken({"a4"}, 3.0, 1.0)
+    known.forget({"a4"}, {"t1", "t2"}, 3.0, 1.0)
+    assert known.routes == {"a1": EARLY, "a2": LATE, "a4": routes["a4"]}
+    assert known.taken({"a4"}, 3.0, 1.0) == taken
 
 
 def test_task_planned_twice_stays_with_the_earliest():

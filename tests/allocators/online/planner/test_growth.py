@@ -7,6 +7,7 @@ import threading
 import pytest
 
 from alloc.allocators import MissionPlanner
+from alloc.allocators.online.groups import announced
 from alloc.allocators.online.planner import estimate, policy_runner, register
 from alloc.allocators.online.routes import describe, tables
 from alloc.problems import InputError, Instance
@@ -44,7 +45,8 @@ class Steps:
 @pytest.fixture
 def few(monkeypatch):
     """Limit the number of closed entries that are kept."""
-    for module, name in ((register, "MAX_CLOSED"), (policy_runner, "MAX_CLOSED"), (estimate, "MAX_NEWS")):
+    kept = (register, "MAX_CLOSED"), (policy_runner, "MAX_CLOSED"), (estimate, "MAX_NEWS"), (announced, "MOST_GONE")
+    for module, name in kept:
         monkeypatch.setattr(module, name, FEW)
 
 
@@ -167,3 +169,14 @@ def test_routes_forgets_closed_tasks(few, monkeypatch):
             assert describer.describe(view, describe.Foresight()) is not None
     assert len(describer._begun) + len(describer._seen) <= 2 * (4 + FEW)
     assert len(describer._tables._ways) <= 4 * (4 * 4 + FEW) + 4 * 4
+
+
+def test_routes_of_agents_that_are_gone_are_forgotten(few):
+    """In `local-routes`, an agent that lasts keeps few routes of those that have failed."""
+    with MissionPlanner(crew(), "local-routes", None) as planner:
+        planner.submit(
+            {"event": "agent-joins", "agent": {"id": "lasting", "ability": 1, "speed": 1, "position": [0, 0]}}
+        )
+        for number in range(3, 40):
+            exchange(planner, number)
+        assert len(planner._leader._agents["lasting"]._announced.routes) <= 2 * (4 + FEW)
