@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from alloc.allocators.missions.chance import fraction, keyed
-from alloc.allocators.missions.grid import cells_near, find_within, sort
+from alloc.allocators.missions.grid import cells_near, find_within, limit_of, sort
 from alloc.allocators.missions.layout import IDLE, NOBODY, WORKING, MissionArrays, Numbers
 from alloc.allocators.missions.motion import distance_between, place_of
 from alloc.allocators.missions.records import Head
@@ -107,11 +107,12 @@ def find_senders(state: MissionArrays, slot: int) -> bool:
     For the returned value, messages lost in bursts count as received.
     """
     head, found, begin = state.head[0], False, 0
+    limit = limit_of(head.is_manhattan, head.radius + TOLERANCE)
     for number in range(len(state.agents)):
         state.first_sender[slot, number] = begin
         end = begin
         if IDLE <= state.agents[number].status <= WORKING:
-            end = find_near(state, number, begin, state.sender[slot])
+            end = find_near(state, number, limit, begin, state.sender[slot])
         found = found or end > begin
         if head.has_burst:
             end = lose_in_bursts(head, state.sender[slot], begin, end, number, state.links)
@@ -123,16 +124,19 @@ def find_senders(state: MissionArrays, slot: int) -> bool:
 
 
 @compiled_in_place
-def find_near(state: MissionArrays, number: int, end: int, near: Numbers) -> int:
-    """Append the senders within an agent's radius whose messages are not lost; return the end of the list."""
+def find_near(state: MissionArrays, number: int, limit: float, end: int, near: Numbers) -> int:
+    """Append the senders within an agent's radius whose messages are not lost; return the end of the list.
+
+    The radius is also given as `limit`, by `limit_of`.
+    """
     head, here, room = state.head[0], place_of(state.agents[number], state.head[0].hour), (state.is_near, state.near)
-    radius, cells = head.radius + TOLERANCE, state.speaker_cells
-    first, last, low, high = cells_near(head, here[0], here[1], radius)
+    cells = state.speaker_cells
+    first, last, low, high = cells_near(head, here[0], here[1], head.radius + TOLERANCE)
     for row in range(low, high + 1):
         begin, until = cells[row * head.columns + first], cells[row * head.columns + last + 1]
         if begin == until:
             continue
-        for place in range(find_within(head.is_manhattan, radius, here, state.speaker_places, begin, until, room)):
+        for place in range(find_within(head.is_manhattan, limit, here, state.speaker_places, begin, until, room)):
             other = state.speakers[state.near[place]]
             is_heard = other != number
             if head.loss > 0:

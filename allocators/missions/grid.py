@@ -97,15 +97,32 @@ def cell_of(head: Head, place: Point) -> int:
 
 
 @compiled_in_place
+def limit_of(is_manhattan: int, reach: float) -> float:
+    """Return the largest `comparable_length` of a difference vector that is not longer than `reach`.
+
+    A square root is rounded, so the square of `reach` may be off by a rounding error.
+    """
+    if is_manhattan or not reach < np.inf:
+        return reach
+    limit = reach * reach
+    while math.sqrt(limit) > reach:
+        limit = np.nextafter(limit, 0.0)
+    while math.sqrt(np.nextafter(limit, np.inf)) <= reach:
+        limit = np.nextafter(limit, np.inf)
+    return limit
+
+
+@compiled_in_place
 def find_within(
-    is_manhattan: int, reach: float, to: Point, places: FloatArray, begin: int, end: int, room: Found
+    is_manhattan: int, limit: float, to: Point, places: FloatArray, begin: int, end: int, room: Found
 ) -> int:
     """Find the places that are within reach of a point, or unknown; return their number.
 
     Parameters
     ----------
     is_manhattan : int
-    reach : float
+    limit : float
+        The reach, by `limit_of`.
     to : tuple of float
     places : ndarray, shape (3, places)
     begin, end : int
@@ -114,21 +131,21 @@ def find_within(
         Output: the indices of the places found.
     """
     is_near, near = room
-    at_x, at_y, at_z = places[0], places[1], places[2]
+    at_x, at_y, at_z = places[0, begin:end], places[1, begin:end], places[2, begin:end]
     x, y, z = to
-    for place in range(begin, end):
-        is_near[place] = not length(is_manhattan, at_x[place] - x, at_y[place] - y, at_z[place] - z) > reach
+    for place in range(end - begin):  # from 0, so that the loop is vectorised
+        is_near[place] = not comparable_length(is_manhattan, at_x[place] - x, at_y[place] - y, at_z[place] - z) > limit
     found = 0
-    for place in range(begin, end):
-        near[found] = place
+    for place in range(end - begin):
+        near[found] = begin + place
         found += is_near[place]
     return found
 
 
 @inlined
-def length(is_manhattan: int, dx: float, dy: float, dz: float) -> float:
-    """Return the length of a difference vector, NaN if it has unknown coordinates."""
-    return abs(dx) + abs(dy) + abs(dz) if is_manhattan else math.sqrt(dx * dx + dy * dy + dz * dz)
+def comparable_length(is_manhattan: int, dx: float, dy: float, dz: float) -> float:
+    """Return the length of a difference vector, squared if it is Euclidean; NaN if it has unknown coordinates."""
+    return abs(dx) + abs(dy) + abs(dz) if is_manhattan else dx * dx + dy * dy + dz * dz
 
 
 @compiled_in_place

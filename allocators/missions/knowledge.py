@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from alloc.allocators.missions.grid import SLACK, cells_near, drift, find_within, length, locate
+from alloc.allocators.missions.grid import SLACK, cells_near, comparable_length, drift, find_within, limit_of, locate
 from alloc.allocators.missions.layout import ABSENT, IDLE, OPEN, TO_COME, WORKING, MissionArrays
 from alloc.allocators.missions.motion import Point, place_of, work_left
 from alloc.allocators.missions.records import Agent, Head, Task
@@ -31,11 +31,12 @@ def look_around(state: MissionArrays, is_located: bool) -> None:
     if is_located:
         locate(head, state.agents, state.places, state.cells, state.in_cells)
     note_tasks(state)
+    limit = limit_of(head.is_manhattan, head.sensing + TOLERANCE)
     for place in range(head.lookers):
         number = state.lookers[place]
         here = place_of(state.agents[number], head.hour)
-        see_tasks(state, number, here)
-        see_agents(state, number, here, is_located)
+        see_tasks(state, number, here, limit)
+        see_agents(state, number, here, limit, is_located)
     head.lookers = 0
 
 
@@ -50,17 +51,18 @@ def note_tasks(state: MissionArrays) -> None:
 
 
 @compiled_in_place
-def see_tasks(state: MissionArrays, number: int, here: Point) -> None:
-    """Update an agent's knowledge of the tasks that it senses."""
-    head, hours, left, now = state.head[0], state.task_hour[number], state.task_left[number], state.task_now
-    hour, is_manhattan, sensing = head.hour, head.is_manhattan, head.sensing + TOLERANCE
+def see_tasks(state: MissionArrays, number: int, here: Point, limit: float) -> None:
+    """Update an agent's knowledge of the tasks that it senses; `limit` is the sensing radius, by `limit_of`."""
+    head, hours, left = state.head[0], state.task_hour[number], state.task_left[number]
+    hour, is_manhattan = head.hour, head.is_manhattan
     at_x, at_y, at_z = state.sites[0], state.sites[1], state.sites[2]
     x, y, z = here
-    for at in range(len(now)):
-        is_far = length(is_manhattan, at_x[at] - x, at_y[at] - y, at_z[at] - z) > sensing
-        is_seen = (not is_far) & (now[at] == now[at])
-        hours[at] = hour if is_seen else hours[at]  # branchless, so that the loop is vectorised
-        left[at] = now[at] if is_seen else left[at]
+    for at in range(len(state.task_now)):  # without branches, so that the loop is vectorised
+        now, known, known_left = state.task_now[at], hours[at], left[at]
+        is_far = comparable_length(is_manhattan, at_x[at] - x, at_y[at] - y, at_z[at] - z) > limit
+        is_seen = (not is_far) & (now == now)
+        hours[at] = hour if is_seen else known
+        left[at] = now if is_seen else known_left
 
 
 @compiled_in_place
@@ -70,22 +72,24 @@ def seen_of(head: Head, agents: Sequence[Agent], task: Task, number: int) -> flo
 
 
 @compiled_in_place
-def see_agents(state: MissionArrays, number: int, here: Point, is_located: bool) -> None:
+def see_agents(state: MissionArrays, number: int, here: Point, limit: float, is_located: bool) -> None:
     """Update an agent's knowledge of the agents that it senses; `is_located` if the grid has their present places."""
     head, room = state.head[0], (state.is_near, state.near)
-    sensing, is_manhattan = head.sensing + TOLERANCE, head.is_manhattan
-    reach = sensing if is_located else (sensing + drift(head)) * (1 + SLACK)
+    reach, reach_limit, is_manhattan = head.sensing + TOLERANCE, limit, head.is_manhattan
+    if not is_located:
+        reach = (reach + drift(head)) * (1 + SLACK)
+        reach_limit = limit_of(is_manhattan, reach)
     first, last, low, high = cells_near(head, here[0], here[1], reach)
     for row in range(low, high + 1):
         begin, end = state.cells[row * head.columns + first], state.cells[row * head.columns + last + 1]
-        for place in range(find_within(is_manhattan, reach, here, state.places, begin, end, room)):
+        for place in range(find_within(is_manhattan, reach_limit, here, state.places, begin, end, room)):
             other = state.in_cells[state.near[place]]
             agent = state.agents[other]
             if not IDLE <= agent.status <= WORKING:
                 continue
             if not is_located:
                 at = place_of(agent, head.hour)
-                if length(is_manhattan, at[0] - here[0], at[1] - here[1], at[2] - here[2]) > sensing:
+                if comparable_length(is_manhattan, at[0] - here[0], at[1] - here[1], at[2] - here[2]) > limit:
                     continue
             if agent.reported != head.looks:
                 report_now(state, agent)

@@ -7,7 +7,7 @@ import numpy as np
 from alloc.allocators.learned.missions import situation as known
 from alloc.allocators.learned.missions.situation import Situation
 from alloc.allocators.missions.chance import first_key, fraction, keyed
-from alloc.allocators.runtime.compiled import compiled_in_place
+from alloc.allocators.runtime.compiled import compiled_in_place, inlined
 from alloc.problems.fields import FloatArray
 
 CELLS = 8
@@ -62,8 +62,8 @@ def find_unseen(
     situation : Situation
     area : ndarray, shape (2, 3)
     sensing : float
-    last : ndarray, shape (cells,)
-        Hour at which the agent last saw each cell; updated with reports on other agents.
+    last : ndarray, shape (2, cells)
+        Hour at which the agent last saw each cell, updated with reports on other agents; and scratch.
     seed, number : int
         Seed of the run, and index of the agent.
     goal : int
@@ -71,32 +71,35 @@ def find_unseen(
     look : ndarray, shape (3,)
         See `fill_options`.
     """
-    own = situation.own
+    own, hours, values = situation.own, last[0], last[1]
     for i in range(situation.others[0]):
         if situation.counts[i]:
             at = situation.other[known.OTHER_X, i], situation.other[known.OTHER_Y, i]
-            notice(area, sensing, at[0], at[1], own[known.HOUR] - 1e-3, last)
+            notice(area, sensing, at[0], at[1], own[known.HOUR] - 1e-3, hours)
     best, found = -np.inf, goal
     if goal < 0:
         key = keyed(keyed(first_key(EXPLORING), seed), number)
-        for cell in range(CELLS * CELLS):
-            way, age = rate_cell(own, area, last, cell)
+        for cell in range(CELLS * CELLS):  # without branches, so that the loop is vectorised
+            way, age = rate_cell(own, area, hours[cell], cell)
             value = age - way / max(own[known.SPAN], 1e-9) + SPREAD * fraction(keyed(key, cell))
             is_cheap = own[known.ENERGY_PER_DISTANCE] * way <= BATTERY_SHARE * own[known.BATTERY]
-            if value > best and is_cheap:
-                best, found = value, cell
+            values[cell] = value if is_cheap else -np.inf
+        for cell in range(CELLS * CELLS):
+            if values[cell] > best:
+                best, found = values[cell], cell
     look[0] = found >= 0
     if found >= 0:
-        way, look[2] = rate_cell(own, area, last, found)
+        way, look[2] = rate_cell(own, area, hours[found], found)
         look[1] = way / max(own[known.SPAN], 1e-9)
     return found
 
 
-@compiled_in_place
-def rate_cell(own: FloatArray, area: FloatArray, last: FloatArray, cell: int) -> tuple[float, float]:
-    """Return the distance of a cell, and the time since it was last seen, scaled from 0 to 1."""
+@inlined
+def rate_cell(own: FloatArray, area: FloatArray, last: float, cell: int) -> tuple[float, float]:
+    """Return the distance of a cell, and the time since it was last seen, at hour `last`, scaled from 0 to 1."""
     x, y, z = centre(area, cell)
     dx, dy, dz = x - own[known.X], y - own[known.Y], z - own[known.Z]
     way = math.sqrt(dx * dx + dy * dy + dz * dz)
     scale = max(own[known.SPAN] / own[known.SPEED], 1e-9)
-    return way, min(1.0, (own[known.HOUR] - last[cell]) / scale) if last[cell] >= 0 else 1.0
+    age = min(1.0, (own[known.HOUR] - last) / scale)
+    return way, age if last >= 0 else 1.0

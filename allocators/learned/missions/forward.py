@@ -68,5 +68,5 @@ def add_context(
     for k in range(HIDDEN):
         value = F(0)
         for j in range(HIDDEN):
-            value += pooled[0, j] * weights.context[k, j]
+            value += pooled[0, j] * weights.context[j * HIDDEN + k]
         pooled[1, k] = weights.own_bias[k] + value / total

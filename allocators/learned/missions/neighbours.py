@@ -15,7 +15,7 @@ from alloc.allocators.learned.missions.options import fill_options
 from alloc.allocators.learned.missions.situation import Situation
 from alloc.allocators.missions.layout import NOBODY
 from alloc.allocators.missions.motion import distance_between
-from alloc.allocators.runtime.compiled import compiled_in_place
+from alloc.allocators.runtime.compiled import compiled_in_place, inlined
 from alloc.problems.fields import BoolArray, FloatArray, IntArray
 
 Scratch = tuple[Singles, Singles, Singles, Singles, IntArray]
@@ -74,7 +74,7 @@ def foresee(situation: Situation, swap: Swap, look: FloatArray, room: Scratch, w
     """Write the predicted choices of free neighbours that decide before an agent without a task; return their number.
 
     Agents that were free when last heard of have decided since; of those that are free now, the ones that precede the
-    agent (`precedes`) decide first. For an agent that has a task, which it usually keeps, nothing is predicted.
+    agent (`precedes`) decide first.
 
     Parameters
     ----------
@@ -86,8 +86,6 @@ def foresee(situation: Situation, swap: Swap, look: FloatArray, room: Scratch, w
     weights : MissionWeights
     """
     own, other, waits = situation.own, situation.other, swap.waits
-    if own[known.METRIC] == known.OTHER_WAYS or own[known.TARGET] >= 0:
-        return 0
     step_out(situation, swap)
     found = 0
     for i in range(situation.others[0]):
@@ -106,6 +104,12 @@ def foresee(situation: Situation, swap: Swap, look: FloatArray, room: Scratch, w
     if decided:
         step_in(situation, swap)
     return decided
+
+
+@inlined
+def needs_foresight(own: FloatArray) -> bool:
+    """Whether choices are to be predicted: not for an agent that has a task, which it usually keeps."""
+    return own[known.METRIC] != known.OTHER_WAYS and own[known.TARGET] < 0
 
 
 @compiled_in_place

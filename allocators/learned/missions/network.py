@@ -67,7 +67,7 @@ def compiled_weights(network: MissionNetwork) -> MissionWeights:
         query=matrix(network.query)[0],
         own=by_input(network.own),
         own_bias=bias(network.own),
-        context=matrix(network.context),
+        context=by_input(network.context),
         out=matrix(network.out)[0],
         skip=matrix(network.skip, WIDTH)[0],
     )

@@ -15,9 +15,9 @@ WIDTH = 32
 
 
 class MissionWeights(NamedTuple):
-    """Weights of a `MissionNetwork`; matrices are indexed by output, then input, as in torch.
+    """Weights of a `MissionNetwork`.
 
-    `inner` and `skip` have `WIDTH` columns.
+    Matrices are flattened, by input and then output, the transpose of torch's; `skip` is padded to `WIDTH` features.
     """
 
     inner: Singles

@@ -31,7 +31,7 @@ def time_scale(own: FloatArray) -> float:
     return hours if hours > 0 else 1.0
 
 
-@compiled_in_place
+@inlined
 def expect(situation: Situation) -> int:
     """Write which agents come to each task, and when it is done without the agent; return how many others are idle.
 
@@ -208,7 +208,7 @@ def rivals(situation: Situation, j: int, distance: float, idle: int) -> float:
     return nearer(situation.coming.idle_places, idle, (x, y, z), distance, is_manhattan)
 
 
-@compiled_in_place
+@inlined
 def nearer(places: FloatArray, count: int, to: Point, distance: float, is_manhattan: bool) -> int:
     """Return how many of the first places are within a distance of a place; Euclidean distances are squared."""
     x, y, z = to
@@ -221,7 +221,7 @@ def nearer(places: FloatArray, count: int, to: Point, distance: float, is_manhat
     return found
 
 
-@compiled_in_place
+@inlined
 def fill_crowding(situation: Situation, tasks: IntArray, options: Singles) -> None:
     """Write the amount of other work near each task."""
     task, near = situation.task, NEAR * situation.own[known.SPAN]
@@ -236,7 +236,7 @@ def fill_crowding(situation: Situation, tasks: IntArray, options: Singles) -> No
         options[row, names.CROWDING] = squashed((found - is_near_itself) / 3.0)
 
 
-@compiled_in_place
+@inlined
 def fill_whole(situation: Situation, choice: IntArray, tasks: int, options: Singles) -> None:
     """Write the features that all options share, and those relative to a mean."""
     agents, ability = 1.0, situation.own[known.ABILITY]
@@ -247,7 +247,7 @@ def fill_whole(situation: Situation, choice: IntArray, tasks: int, options: Sing
     fill_shared(situation, choice, tasks, options, agents, ability)
 
 
-@compiled_in_place
+@inlined
 def fill_shared(
     situation: Situation, choice: IntArray, tasks: int, options: Singles, agents: float, ability: float
 ) -> None:

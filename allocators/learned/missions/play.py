@@ -6,7 +6,7 @@ import numpy as np
 
 from alloc.allocators.learned.missions.exploring import CELLS, centre, find_unseen, notice
 from alloc.allocators.learned.missions.forward import score
-from alloc.allocators.learned.missions.neighbours import Swap, foresee, swap_for
+from alloc.allocators.learned.missions.neighbours import Swap, foresee, needs_foresight, swap_for
 from alloc.allocators.learned.missions.network_arrays import HIDDEN, WIDTH, MissionWeights, Singles
 from alloc.allocators.learned.missions.options import WAIT, fill_options
 from alloc.allocators.learned.missions.situation import IS_FLYING, TARGET, Situation, empty, fill
@@ -45,7 +45,7 @@ class Room(NamedTuple):
     choice : ndarray of int
     look : ndarray, shape (3,)
         See `fill_options`.
-    last : ndarray, shape (cells,)
+    last : ndarray, shape (2, cells)
         See `find_unseen`.
     seen : ndarray, shape (n, cells)
         Hour at which each agent last saw each cell, -1 for never.
@@ -90,7 +90,7 @@ def room_for(n: int, m: int, periods: int = 1) -> Room:
         scores=np.zeros(m + 2, np.float32),
         choice=np.zeros(m + 2, np.intp),
         look=np.zeros(3),
-        last=np.zeros(CELLS * CELLS),
+        last=np.zeros((2, CELLS * CELLS)),
         seen=np.full((n, CELLS * CELLS), -1.0),
         goal=np.full(n, -1),
         decided=np.full(n, -np.inf),
@@ -108,8 +108,8 @@ def is_due(room: Room, number: int, hour: float, period: float, tasks: int, is_b
     return not is_busy or tasks != room.tasks[number] or hour - room.decided[number] >= REVIEW * period
 
 
-@compiled_in_place
-def consider(
+@inlined
+def score_options(
     room: Room, area: FloatArray, sensing: float, seed: int, number: int, row: int, weights: MissionWeights
 ) -> int:
     """Return the number of options of an agent in the given situation, and write their scores into `room`.
@@ -131,14 +131,23 @@ def consider(
     target = int(own[TARGET])
     if sensing < np.inf and (target < 0 or not room.situation.can[target]):
         goal = room.goal[row] if own[TARGET] < 0 and own[IS_FLYING] > 0 else -1
-        for cell in range(len(room.last)):
-            room.last[cell] = room.seen[row, cell]
+        for cell in range(CELLS * CELLS):
+            room.last[0, cell] = room.seen[row, cell]
         room.goal[row] = find_unseen(room.situation, area, sensing, room.last, seed, number, goal, room.look)
     scratch = room.options, room.token, room.pooled, room.scores, room.choice
-    foresee(room.situation, room.swap, room.look, scratch, weights)
+    if needs_foresight(own):
+        foresee(room.situation, room.swap, room.look, scratch, weights)
     count = fill_options(room.situation, room.look, room.options, room.choice)
     score(room.options, count, weights, room.token, room.pooled, room.scores)
     return count
+
+
+@compiled_in_place
+def consider(
+    room: Room, area: FloatArray, sensing: float, seed: int, number: int, row: int, weights: MissionWeights
+) -> int:
+    """Do the same as `score_options`, for callers that are not compiled."""
+    return score_options(room, area, sensing, seed, number, row, weights)
 
 
 @inlined
@@ -232,6 +241,6 @@ def play(state: MissionArrays, room: Room, weights: MissionWeights, seed: int) -
         for place in range(head.deciding):
             number = state.deciding[place]
             if wants(state, room, number):
-                count = consider(room, state.area, sensing, seed, number, number, weights)
+                count = score_options(room, state.area, sensing, seed, number, number, weights)
                 act(state, room, number, room.choice[np.argmax(room.scores[:count])])
                 considered += 1

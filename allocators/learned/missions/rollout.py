@@ -7,7 +7,7 @@ import numpy as np
 
 from alloc.allocators.learned.missions.feature_names import FEATURES
 from alloc.allocators.learned.missions.network_arrays import MissionWeights, Singles
-from alloc.allocators.learned.missions.play import Room, act, consider, talk, wants
+from alloc.allocators.learned.missions.play import Room, act, score_options, talk, wants
 from alloc.allocators.missions.advance import advance
 from alloc.allocators.missions.chance import first_key, fraction, keyed
 from alloc.allocators.missions.layout import IDLE, MESSAGES, MISSED, OVER, WORKING, MissionArrays
@@ -144,7 +144,7 @@ def rollout(state: MissionArrays, room: Room, weights: MissionWeights, seed: int
             number = state.deciding[place]
             account(state, record, number)
             if wants(state, room, number):
-                count = consider(room, state.area, sensing, seed, number, number, weights)
+                count = score_options(room, state.area, sensing, seed, number, number, weights)
                 option, log_probability = sample(room, count, keyed(key, drawn))
                 drawn += 1
                 k = record.length[0]

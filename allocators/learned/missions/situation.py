@@ -119,7 +119,7 @@ def empty(n: int, m: int) -> Situation:
     )
 
 
-@compiled_in_place
+@inlined
 def fill(state: MissionArrays, number: int, situation: Situation) -> None:
     """Write an agent's knowledge in a compiled mission."""
     fill_own(state, number, situation.own)
@@ -127,7 +127,7 @@ def fill(state: MissionArrays, number: int, situation: Situation) -> None:
     fill_others(state, number, situation, MEMORY * state.head[0].period)
 
 
-@compiled_in_place
+@inlined
 def fill_own(state: MissionArrays, number: int, own: FloatArray) -> None:
     """Write an agent's knowledge of itself."""
     head, agent = state.head[0], state.agents[number]
@@ -141,7 +141,7 @@ def fill_own(state: MissionArrays, number: int, own: FloatArray) -> None:
     own[METRIC] = MANHATTAN_WAYS if head.is_manhattan else EUCLIDEAN_WAYS
 
 
-@compiled_in_place
+@inlined
 def fill_tasks(state: MissionArrays, number: int, task: FloatArray, can: BoolArray) -> None:
     """Write an agent's knowledge of tasks."""
     head, agent = state.head[0], state.agents[number]
@@ -167,7 +167,7 @@ def does_count(report: Report, who: int, number: int, hour: float, memory: float
     return who != number and hour - report.hour <= memory and IDLE <= report.status <= WORKING
 
 
-@compiled_in_place
+@inlined
 def fill_others(state: MissionArrays, number: int, situation: Situation, memory: float) -> None:
     """Write an agent's knowledge of the other agents that count, with reports at most `memory` hours old."""
     head, row, found = state.head[0], state.agents[number].known, 0
@@ -189,7 +189,7 @@ def fill_others(state: MissionArrays, number: int, situation: Situation, memory:
     clear_others(situation, found)
 
 
-@compiled_in_place
+@inlined
 def clear_others(situation: Situation, found: int) -> None:
     """Mark only the first `found` entries of other agents as in use."""
     for place in range(found, situation.others[0]):
