@@ -107,7 +107,7 @@ def arrive(state: MissionArrays, number: int) -> None:
         state.head[0].is_news = 1
 
 
-@compiled_in_place
+@inlined
 def talk(state: MissionArrays) -> bool:
     """Let all agents sense; return whether any can send a message."""
     head, can_send = state.head[0], False
@@ -127,7 +127,7 @@ def talk(state: MissionArrays) -> bool:
     return can_send
 
 
-@compiled_in_place
+@inlined
 def send(state: MissionArrays) -> None:
     """Send the messages of all agents that can and want to, and schedule the next ones."""
     head = state.head[0]
@@ -139,7 +139,7 @@ def send(state: MissionArrays) -> None:
     head.stage = WITHIN
 
 
-@compiled_in_place
+@inlined
 def find_deciding(state: MissionArrays) -> bool:
     """Fill in the agents that get orders now, in the order of the mission; return whether there are any."""
     head, agents = state.head[0], state.agents
@@ -160,7 +160,7 @@ def find_deciding(state: MissionArrays) -> bool:
     return head.deciding > 0
 
 
-@compiled_in_place
+@inlined
 def look(state: MissionArrays) -> None:
     """Let all deciding agents sense, unless they have done so in this turn."""
     head = state.head[0]

@@ -10,7 +10,7 @@ from alloc.allocators.missions.layout import IDLE, NOBODY, WORKING, MissionArray
 from alloc.allocators.missions.motion import distance_between, place_of
 from alloc.allocators.missions.records import Head
 from alloc.allocators.missions.reports import count_known, hear_of_agents, keep_recent
-from alloc.allocators.runtime.compiled import compiled_in_place
+from alloc.allocators.runtime.compiled import compiled_in_place, inlined
 from alloc.problems.distances.reach import TOLERANCE
 from alloc.problems.fields import FloatArray
 from alloc.problems.missions.simulation.reports import BYTES_OF_AGENT, BYTES_OF_MESSAGE, BYTES_OF_TASK
@@ -34,7 +34,7 @@ def is_silent(state: MissionArrays, number: int) -> bool:
     return False
 
 
-@compiled_in_place
+@inlined
 def send_all(state: MissionArrays, slot: int) -> bool:
     """Send the knowledge of all agents that can and want to send; return whether any message is received."""
     head, agents, speaks = state.head[0], state.agents, state.speaks
@@ -58,7 +58,7 @@ def send_all(state: MissionArrays, slot: int) -> bool:
     return found
 
 
-@compiled_in_place
+@inlined
 def gather_speakers(state: MissionArrays) -> int:
     """Fill in the senders and their places by the cells of the grid; return the number of senders."""
     places, speakers, to, at, count = state.places, state.speakers, state.speaker_places, state.speaker_cells, 0
@@ -100,7 +100,7 @@ def keep(state: MissionArrays, slot: int, number: int) -> None:
         state.sent_of[slot, number, word] = state.heard_of[number, word]
 
 
-@compiled_in_place
+@inlined
 def find_senders(state: MissionArrays, slot: int) -> bool:
     """Fill in the senders whose messages each agent will receive; return whether there are any.
 
@@ -123,7 +123,7 @@ def find_senders(state: MissionArrays, slot: int) -> bool:
     return found
 
 
-@compiled_in_place
+@inlined
 def find_near(state: MissionArrays, number: int, limit: float, end: int, near: Numbers) -> int:
     """Append the senders within an agent's radius whose messages are not lost; return the end of the list.
 
@@ -174,7 +174,7 @@ def is_link_bad(head: Head, sender: int, hearer: int, links: Numbers) -> bool:
     return bool(is_bad != 0)
 
 
-@compiled_in_place
+@inlined
 def deliver(state: MissionArrays, slot: int) -> None:
     """Deliver the messages of a slot to all their receivers."""
     head, senders = state.head[0], state.senders[slot]
@@ -191,7 +191,7 @@ def deliver(state: MissionArrays, slot: int) -> None:
     state.sent[slot] = 0
 
 
-@compiled_in_place
+@inlined
 def hear_of_tasks(state: MissionArrays, slot: int, number: int) -> None:
     """Let an agent adopt newer knowledge of tasks from the messages that it receives."""
     first = state.first_sender[slot, number]

@@ -112,7 +112,7 @@ def limit_of(is_manhattan: int, reach: float) -> float:
     return limit
 
 
-@compiled_in_place
+@inlined
 def find_within(
     is_manhattan: int, limit: float, to: Point, places: FloatArray, begin: int, end: int, room: Found
 ) -> int:

@@ -9,7 +9,7 @@ from alloc.allocators.missions.layout import ABSENT, IDLE, OPEN, TO_COME, WORKIN
 from alloc.allocators.missions.motion import Point, place_of, work_left
 from alloc.allocators.missions.records import Agent, Head, Task
 from alloc.allocators.missions.reports import drop_unknown, learn, report_now, write_report
-from alloc.allocators.runtime.compiled import compiled_in_place
+from alloc.allocators.runtime.compiled import compiled_in_place, inlined
 from alloc.problems.distances.reach import TOLERANCE
 
 
@@ -40,7 +40,7 @@ def look_around(state: MissionArrays, is_located: bool) -> None:
     head.lookers = 0
 
 
-@compiled_in_place
+@inlined
 def note_tasks(state: MissionArrays) -> None:
     """Note what sensing each task yields now, NaN for tasks still to come."""
     head = state.head[0]
@@ -50,7 +50,7 @@ def note_tasks(state: MissionArrays) -> None:
         state.task_now[number] = seen_of(head, state.agents, task, number) if is_there else np.nan
 
 
-@compiled_in_place
+@inlined
 def see_tasks(state: MissionArrays, number: int, here: Point, limit: float) -> None:
     """Update an agent's knowledge of the tasks that it senses; `limit` is the sensing radius, by `limit_of`."""
     head, hours, left = state.head[0], state.task_hour[number], state.task_left[number]
@@ -71,7 +71,7 @@ def seen_of(head: Head, agents: Sequence[Agent], task: Task, number: int) -> flo
     return work_left(head, agents, task, number) if task.status == OPEN else -float(task.status)
 
 
-@compiled_in_place
+@inlined
 def see_agents(state: MissionArrays, number: int, here: Point, limit: float, is_located: bool) -> None:
     """Update an agent's knowledge of the agents that it senses; `is_located` if the grid has their present places."""
     head, room = state.head[0], (state.is_near, state.near)

@@ -141,11 +141,18 @@ def begun(packed: MissionArrays, seed: int = 0) -> MissionArrays:
     seed : int
         Seed of message losses, together with that of the mission.
     """
-    parts = {name: _fresh(part) if name.startswith(EMPTY) else part.copy() for name, part in packed._asdict().items()}
+    parts = {name: _fresh(part) if name.startswith(EMPTY) else _copied(part) for name, part in packed._asdict().items()}
     state = MissionArrays(**parts)  # type: ignore[arg-type]
     head = state.head[0]
     head.loss_key, head.burst_key = keyed(head.loss_key, seed), keyed(head.burst_key, seed)
     return state
+
+
+def _copied(part: Records | FloatArray) -> Records | FloatArray:
+    """Return a copy of an array; numpy would copy records field by field."""
+    if part.dtype.names is None:
+        return part.copy()
+    return _by_attribute(cast(Records, part.view(np.ndarray).view(np.uint8).copy().view(part.dtype)))
 
 
 def _fresh(part: Records | FloatArray) -> Records | FloatArray:

@@ -23,7 +23,7 @@ SLACK = 1e-6
 """Share of the memory by which reports are kept longer, to allow for rounding errors."""
 
 
-@compiled_in_place
+@inlined
 def report_now(state: MissionArrays, agent: Agent) -> None:
     """Write a new report of an agent, for agents that sense now."""
     head = state.head[0]
@@ -61,7 +61,7 @@ def learn(state: MissionArrays, row: int, agent: int, report: int) -> None:
     state.known_report[row, agent] = report
 
 
-@compiled_in_place
+@inlined
 def hear_of_agents(state: MissionArrays, slot: int, number: int) -> None:
     """Let an agent adopt newer reports of agents from the messages that it receives."""
     head, known, first = state.head[0], state.known_report[number], state.first_sender[slot, number]

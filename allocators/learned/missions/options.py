@@ -18,10 +18,20 @@ NEAR = 0.15
 """Share of the span within which other work counts as nearby."""
 
 
+THIRDS = (1.0 - 1.0 / (1.0 + np.arange(64) / 3.0)).astype(np.float32)
+"""The values of `squashed_count` for small numbers, as divisions take long."""
+
+
 @inlined
-def squashed(value: float) -> float:
-    """Map a number in [0, inf] to [0, 1]."""
-    return 1.0 - 1.0 / (1.0 + value)
+def squashed(value: float, unit: float) -> float:
+    """Map a number in [0, inf] of units to [0, 1]: x to x / (1 + x)."""
+    return 1.0 - unit / (unit + value)
+
+
+@inlined
+def squashed_count(count: int) -> np.float32:
+    """Map a number of agents or tasks to [0, 1]."""
+    return THIRDS[count] if count < len(THIRDS) else np.float32(squashed(count, 3.0))
 
 
 @compiled_in_place
@@ -181,27 +191,28 @@ def fill_task(situation: Situation, j: int, option: Singles, idle: int, scale: f
         left += task[known.GROWTH, j] * (arrival - task[known.KNOWN_AT, j])
     with_me = max(hour, done_with(situation, j, arrival, left))
     option[names.TRAVEL] = min(distance / own[known.SPAN], 2.0) if own[known.SPAN] > 0 else 0.0
-    option[names.WITH_ME] = squashed((with_me - hour) / scale)
-    option[names.WITHOUT] = squashed(max(0.0, without - hour) / scale)
+    option[names.WITH_ME] = squashed(with_me - hour, scale)
+    option[names.WITHOUT] = squashed(max(0.0, without - hour), scale)
     option[names.IS_ORDER], option[names.IS_WORK] = is_order, is_there
-    option[names.OTHERS], option[names.IS_ALONE] = squashed(others / 3.0), others == 0
-    option[names.WORK] = squashed(left / own[known.ABILITY] / scale)
+    option[names.OTHERS], option[names.IS_ALONE] = squashed_count(others), others == 0
+    option[names.WORK] = squashed(left, own[known.ABILITY] * scale)
     option[names.IS_LATE] = without <= arrival
-    option[names.AGE] = squashed((hour - task[known.KNOWN_AT, j]) / scale)
+    option[names.AGE] = squashed(hour - task[known.KNOWN_AT, j], scale)
     option[names.SHARE] = (with_me - arrival) / (with_me - hour) if with_me > hour else 1.0
     option[names.SHARE] = max(option[names.SHARE], np.float32(0))
-    option[names.GAIN] = squashed(max(0.0, without - with_me) / scale)
+    option[names.GAIN] = squashed(max(0.0, without - with_me), scale)
     deadline = task[known.DEADLINE, j]
     option[names.SLACK] = min(max(-1.0, (deadline - with_me) / scale), 1.0)
     option[names.MISSES] = with_me > deadline
-    option[names.GROWTH] = squashed(task[known.GROWTH, j] / own[known.ABILITY])
+    growth = task[known.GROWTH, j]
+    option[names.GROWTH] = squashed(growth, own[known.ABILITY]) if growth > 0 else 0.0
     energy = own[known.ENERGY_PER_DISTANCE] * distance
     option[names.ENERGY] = min(energy / own[known.BATTERY], 1.0) if energy > 0 else 0.0
-    option[names.RIVALS] = squashed(rivals(situation, j, distance, idle) / 3.0)
+    option[names.RIVALS] = squashed_count(rivals(situation, j, distance, idle))
 
 
 @inlined
-def rivals(situation: Situation, j: int, distance: float, idle: int) -> float:
+def rivals(situation: Situation, j: int, distance: float, idle: int) -> int:
     """Return how many other agents without a task are nearer to a task."""
     x, y, z = situation.task[known.TASK_X, j], situation.task[known.TASK_Y, j], situation.task[known.TASK_Z, j]
     is_manhattan = situation.own[known.METRIC] == known.MANHATTAN_WAYS
@@ -233,7 +244,7 @@ def fill_crowding(situation: Situation, tasks: IntArray, options: Singles) -> No
         x, y, z = places[0, row], places[1, row], places[2, row]
         found = nearer(places, len(tasks), (x, y, z), near, False)
         is_near_itself = near > 0.0 and x == x
-        options[row, names.CROWDING] = squashed((found - is_near_itself) / 3.0)
+        options[row, names.CROWDING] = squashed_count(found - is_near_itself)
 
 
 @inlined
@@ -254,10 +265,11 @@ def fill_shared(
     """Write these features, given the number of agents including this one, and the sum of their abilities."""
     own, priority, work = situation.own, 0.0, 0.0
     for row in range(tasks):
-        priority += situation.task[known.PRIORITY, choice[row]] / tasks
+        priority += situation.task[known.PRIORITY, choice[row]]
         work += situation.task[known.LEFT, choice[row]]
-    per_agent, agents_known = squashed(tasks / agents), squashed((agents - 1) / 5.0)
-    ahead, strength = squashed(work / ability / time_scale(own)), min(own[known.ABILITY] * agents / ability - 1, 3.0)
+    priority /= max(tasks, 1)
+    per_agent, agents_known = squashed(tasks, agents), squashed(agents - 1, 5.0)
+    ahead, strength = squashed(work, ability * time_scale(own)), min(own[known.ABILITY] * agents / ability - 1, 3.0)
     for row in range(len(options)):
         option = options[row]
         option[names.TASKS_PER_AGENT], option[names.KNOWN_AGENTS] = per_agent, agents_known

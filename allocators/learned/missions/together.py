@@ -16,7 +16,7 @@ from alloc.allocators.learned.missions.options import (
     fill_shared,
     fill_task,
     queue,
-    squashed,
+    squashed_count,
     time_scale,
 )
 from alloc.allocators.learned.missions.play import Room, is_due, room_for
@@ -233,7 +233,7 @@ def fill_turn(together: Together, i: int) -> int:
         j = choice[row]
         fill_task(situation, j, options[row], 0, scale)
         options[row, names.CROWDING] = together.crowding[row, names.CROWDING]
-        options[row, names.RIVALS] = squashed(nearer(together, i, j) / 3.0)
+        options[row, names.RIVALS] = squashed_count(nearer(together, i, j))
     choice[count] = WAIT
     options[count, names.STAYS] = 1
     others = float(len(together.own))
@@ -242,7 +242,7 @@ def fill_turn(together: Together, i: int) -> int:
 
 
 @inlined
-def nearer(together: Together, i: int, task: int) -> float:
+def nearer(together: Together, i: int, task: int) -> int:
     """Return how many other agents without a task are nearer to a task than an agent."""
     gaps, limit, found = together.gaps[task], together.ways[i, task], 0
     if together.own[i, known.METRIC] != known.MANHATTAN_WAYS:
@@ -250,4 +250,4 @@ def nearer(together: Together, i: int, task: int) -> float:
     for place in range(together.idle[-1]):
         found += gaps[place] < limit
     place = together.column[i]
-    return float(found - (place != NOBODY and gaps[place] < limit))
+    return found - (place != NOBODY and gaps[place] < limit)
