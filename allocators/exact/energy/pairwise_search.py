@@ -16,6 +16,10 @@ from alloc.problems.instance import FloatArray, IntArray
 MAX_WORK = 100_000_000
 """Limit on the table cells of a round of prices, or of a descent over all pairs of tasks, about 0.1 s."""
 
+CYCLES = 0.1, 0.3, 0.6, 1.0
+"""Shares of the annealing progress at which successive cooling cycles end; each starts from the best plan. Plans that
+are good early also let bounds exclude more pairs."""
+
 
 @dataclass(frozen=True)
 class Perturbation:
@@ -28,13 +32,13 @@ class Perturbation:
     partners : int
         Number of nearest tasks with which a task is paired.
     strength, temperature : float
-        Largest noise, and initial temperature, as multiples of the mean distance of an agent.
+        Largest noise, and initial temperature of each cycle, as multiples of the mean distance of an agent.
     """
 
     around: int = 8
     partners: int = 64
     strength: float = 10.0
-    temperature: float = 0.3
+    temperature: float = 1.0
 
 
 class PairwiseSearch:
@@ -78,7 +82,7 @@ class PairwiseSearch:
         self._all_distance, self._all_pairs = self._distance, self._pairs
         self._noise = np.zeros_like(self._distance)
         self._stale = np.ones(len(self._need), dtype=np.bool_)
-        self.best = self._task.copy()
+        self.best, self._cycle = self._task.copy(), 0
 
     @property
     def cost(self) -> float:
@@ -112,6 +116,10 @@ class PairwiseSearch:
     def anneal(self, rounds: int, progress: float) -> None:
         """Perturb and descend `rounds` times at the given annealing progress, from 0 to 1."""
         unit = self.cost * self._scale / len(self._task) + 1e-300
+        cycle = min(int(np.searchsorted(CYCLES, progress, side="right")), len(CYCLES) - 1)
+        if cycle > self._cycle:
+            self._cycle, self._task = cycle, self.best.copy()
+        begin, end = (0.0, *CYCLES)[cycle : cycle + 2]
         perturb(
             self._task,
             self.best,
@@ -124,7 +132,7 @@ class PairwiseSearch:
             self._rng,
             rounds,
             self._perturbation.strength * unit,
-            self._perturbation.temperature * unit * (1 - progress) + 1e-300,
+            self._perturbation.temperature * unit * (end - progress) / (end - begin) + 1e-300,
         )
 
 

@@ -33,9 +33,12 @@ PRECISION, EARLY = 1e-5, 0.05
 """Relative difference between bound and programme at which prices count as optimal; share of the gap to the plan at
 which cuts are added before that."""
 
+FIRST_NODES, MORE_NODES, MOST_NODES = 20_000, 4, 320_000
+"""Limit on the nodes of the search for one group at first, its growth factor, and its maximum."""
+
 MOST_LOST = 0.1
-"""Share of the gap to the plan that truncated searches for groups may cost; beyond it, cuts over classes, which slow
-down these searches, are removed."""
+"""Share of the gap to the plan that truncated searches for groups may cost; beyond it, their limit grows, and at its
+maximum cuts over classes, which slow down these searches, are removed."""
 
 MORE = 8
 """Factor on the number of enumerated groups, as earlier prices exclude many of them."""
@@ -97,6 +100,7 @@ class CuttingPlanes:
         self._master, self._smoothing = GroupMaster(model, member), SMOOTHING
         for group in groups:
             self._master.add(group)
+        self._nodes = FIRST_NODES
         self._price, self._penalty, self._known_prices = price, np.zeros(0), KnownPrices()
         self.bound, self.converged, self._found_none = -np.inf, False, False
         self.kept, self.least_with = np.ones(len(model.copies), dtype=bool), np.full(len(model.copies), -np.inf)
@@ -157,6 +161,9 @@ class CuttingPlanes:
         penalty = smoothing * known + (1 - smoothing) * master.penalty
         value, group, least = self._relax(price, penalty)
         if self._lost(group, least, price, penalty) > MOST_LOST * max(0.0, cost - max(self.bound, value)):
+            if self._nodes < MOST_NODES:
+                self._nodes *= MORE_NODES
+                return
             known[master.leave_out_sets()] = 0.0
             self._penalty = known
             return
@@ -220,7 +227,7 @@ class CuttingPlanes:
             least = master.cheapest(price, penalty)
             value = price_groups(
                 model.first, self._weight, paid, model.copies, self._need, model.max_weight, whole,
-                first_cut, cut, penalty, least, group,
+                first_cut, cut, penalty, least, group, self._nodes,
             )  # fmt: skip
         else:
             group, _, value = solve_subproblems(model, paid, compare=False)

@@ -13,9 +13,6 @@ from alloc.allocators.exact.knapsack import WholeArray, order_of
 from alloc.allocators.runtime.compiled import compiled
 from alloc.problems.instance import FloatArray
 
-MAX_NODES = 20_000
-"""Nodes of the search for one group after which it ends with the bound of the nodes still open."""
-
 STEPS, MOST_STEPS, CELLS = 1000, 10_000, 200_000
 """Minimum and maximum number of steps of a need for non-integer weights, and the target number of table cells."""
 
@@ -24,7 +21,7 @@ STEPS, MOST_STEPS, CELLS = 1000, 10_000, 200_000
 def price_groups(
     first: WholeArray, weight: FloatArray, price: FloatArray, copies: WholeArray, need: FloatArray,
     max_weight: WholeArray, whole: bool, first_cut: WholeArray, cut: WholeArray, penalty: FloatArray,
-    cost: FloatArray, group: WholeArray,
+    cost: FloatArray, group: WholeArray, max_nodes: int,
 ) -> float:  # fmt: skip
     """Write the cheapest group of each task if it is cheaper than the known one; return a bound on their total cost.
 
@@ -45,13 +42,15 @@ def price_groups(
         Input: the cost of the cheapest known group of each task; output: a lower bound on the cost of any group.
     group : ndarray of int, shape (p,)
         Output, initially zeros, unchanged for tasks without a cheaper group.
+    max_nodes : int
+        Nodes of the search for one group after which it ends with the bound of the nodes still open.
     """
     total, taken = 0.0, np.zeros(len(penalty), dtype=np.int64)
     for j in range(len(need)):
         a, b = first[j], first[j + 1]
         cost[j] = cheapest_with_cuts(
             weight[a:b], price[a:b], copies[a:b], need[j], max_weight[j], whole,
-            first_cut[a : b + 1], cut, penalty, taken, cost[j], group[a:b],
+            first_cut[a : b + 1], cut, penalty, taken, cost[j], group[a:b], max_nodes,
         )  # fmt: skip
         total += cost[j]
     return total
@@ -61,6 +60,7 @@ def price_groups(
 def cheapest_with_cuts(
     weight: FloatArray, price: FloatArray, copies: WholeArray, need: float, max_weight: int, whole: bool,
     first_cut: WholeArray, cut: WholeArray, penalty: FloatArray, taken: WholeArray, best: float, group: WholeArray,
+    max_nodes: int,
 ) -> float:  # fmt: skip
     """Implement `price_groups` for one task; `taken` is scratch for agents in each cut, 0 before and after."""
     exact, slack = max_weight >= 0, 1e-9 * (abs(best) + (np.abs(price).max() if len(price) else 0.0))
@@ -79,7 +79,7 @@ def cheapest_with_cuts(
         if branches[q] == 0:
             lower, nodes = paid[q] + rest[q, here], nodes + 1
             is_open = lower < best - slack
-            if is_open and nodes > MAX_NODES:
+            if is_open and nodes > max_nodes:
                 still_open, is_open = min(still_open, lower), False
             if is_open and q == searched:
                 is_open = False
