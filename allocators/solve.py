@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from alloc.allocators.auto import choose, has_whole_abilities
+from alloc.allocators.auto import choose
 from alloc.allocators.bounds import SHORT_S, raise_bound_before
 from alloc.allocators.conclusion import conclude
 from alloc.allocators.contract.base import Allocator, Proposal
@@ -207,8 +207,10 @@ def _slack_may_save(allocator: Allocator, run: Request | Search) -> bool:
     if run.objective is not Objective.MAKESPAN_ENERGY or run.tolerance != EXACT or run.instance.reach.move is not None:
         return False
     limit, method = run.budget.time_limit_s, allocator.method
-    is_quick = run.instance.n <= SLACK_AGENTS and (limit is None or limit >= SLACK_LIMIT_S)
-    return is_quick and method.anytime and method.makespan_slack and not has_whole_abilities(run.instance)
+    if run.instance.n > SLACK_AGENTS or (limit is not None and limit < SLACK_LIMIT_S):
+        return False
+    has_fractions = bool((run.instance.ability != np.round(run.instance.ability)).any())
+    return method.anytime and method.makespan_slack and has_fractions
 
 
 def _is_matched(instance: Instance) -> bool:
