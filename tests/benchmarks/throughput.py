@@ -44,7 +44,7 @@ INSTANCES, ROUNDS, SECONDS, MOST_HERE = 64, 40, 4.0, 512
 CORES = len(os.sched_getaffinity(0))
 
 Play = Callable[[], tuple[int, int]]
-"""Plays for a while; returns decisions and bids weighed."""
+"""Plays for a while; returns decisions and bids compared."""
 
 
 def lay_out(size: tuple[int, int, int], instances: int, weight: float) -> tuple[list[Instance], Board]:
@@ -166,7 +166,7 @@ def ways(counts: Sequence[int]) -> None:
     torch.set_num_threads(1)
     torch.manual_seed(0)
     network = ActorCritic()
-    print("| agents/tasks | game | decisions/s | against PettingZoo | against the prototype | bids weighed/s |")
+    print("| agents/tasks | game | decisions/s | relative to PettingZoo | relative to the prototype | bids compared/s |")
     print("|---|---|--:|--:|--:|--:|")
     for size, count in ((size, count) for count in counts for size in SIZES):
         instances, board = lay_out(size, count, 0.5)
@@ -177,10 +177,10 @@ def ways(counts: Sequence[int]) -> None:
         }
         for name, rules, scored in (
             ("bidding with the network", PLANNING, network),
-            ("bidding, one move a step, with the network", Rules(most_moves=1), network),
+            ("bidding, one move per step, with the network", Rules(most_moves=1), network),
             ("bidding, random", PLANNING, None),
-            ("at once with the network", AT_ONCE, network),
-            ("at once, random", AT_ONCE, None),
+            ("simultaneous, with the network", AT_ONCE, network),
+            ("simultaneous, random", AT_ONCE, None),
             ("the paper's game (flying), random", PAPER, None),
         ):
             games[name] = lambda b=board, r=rules, n=scored: batched(b, r, n, 8)
