@@ -37,7 +37,7 @@ def scattered(n: int, m: int, *, speed: float | None = None) -> Instance:
 def test_choice_follows_size_budget_and_objective(
     n: int, m: int, speed: float | None, objective: str, seconds: float, expected: str
 ) -> None:
-    """Small instances go to a solver, larger ones to the local search, with travel times as well."""
+    """Small instances go to a solver, larger ones to local search, also with travel times."""
     method, reason = choose(scattered(n, m, speed=speed), Objective(objective), Budget(seconds))
     assert method == expected
     assert " for " in reason
@@ -50,14 +50,14 @@ def test_equal_agents_count_once() -> None:
 
 
 def test_longer_limits_favour_exact_methods() -> None:
-    """With a minute or without a limit, a solver is picked where with a second it is not."""
+    """With a minute or without a limit, a solver is picked for an instance for which it is not within a second."""
     instance = scattered(1000, 100)
     picks = [choose(instance, Objective.MAKESPAN_ENERGY, Budget(seconds))[0] for seconds in (1.0, 60.0, None)]
     assert picks == ["local-search", "milp", "milp"]
 
 
 def test_reason_is_grammatical_for_one_and_many_pairs() -> None:
-    """One agent and one task are a pair, and the time is told in few digits."""
+    """One agent and one task are "1 pair", and the time has few digits."""
     one = Instance(ability=[1], workload=[1])
     assert choose(one, Objective.MAKESPAN, Budget(0.0308532))[1].startswith(
         "1 pair of agent class and task, few enough for a proof, or a small gap, in 0.0309 s"

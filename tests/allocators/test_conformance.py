@@ -96,7 +96,7 @@ class TestDdpg(AllocatorConformance):
 
 
 def test_no_method_is_left_out():
-    """Each built-in method has its class above."""
+    """Each built-in method has a class above."""
     classes = [value for _, value in inspect.getmembers(sys.modules[__name__], inspect.isclass)]
     tested = {cls.name for cls in classes if issubclass(cls, AllocatorConformance)}
     assert tested - {""} == set(BUILT_IN)
@@ -119,6 +119,6 @@ def test_expected_refusals():
 
 
 def test_subclass_without_method_fails():
-    """A subclass without a name and without an allocator fails, rather than testing nothing."""
+    """A subclass without a name and without an allocator fails instead of testing nothing."""
     with pytest.raises(InputError, match="no method ''"):
         AllocatorConformance().allocator()

@@ -379,17 +379,17 @@ def test_defect_is_caught(defect, check, arguments, capfd):
 
 @pytest.mark.parametrize(("check", "arguments"), [(c, a) for _, c, a in DEFECTS], ids=lambda value: str(value))
 def test_sound_allocator_passes(check, arguments, capfd):
-    """The same allocator without the defect passes, so it is the defect that is caught."""
+    """The same allocator without the defect passes, so that the failure is due to the defect."""
     run_check(Sound(), check, arguments, capfd)
 
 
 def test_every_check_can_fail():
-    """Each check of the suite has a defect that it catches."""
+    """Each check of the suite detects some defect."""
     assert {check for _, check, _ in DEFECTS} == CHECKS
 
 
 def test_refusals_are_verified():
-    """A method that refuses travel times is skipped on them, and found out if `solve` lets it through after all."""
+    """A method that refuses travel times skips those checks, but fails if `solve` accepts them after all."""
 
     class Refusing(Sound):
         method = replace(PLAIN, finite_speeds=False)
@@ -399,7 +399,7 @@ def test_refusals_are_verified():
 
 
 def test_only_the_suite_imports_pytest():
-    """Importing the allocators does not import pytest, which users need not have."""
+    """Importing the allocators does not import pytest."""
     import subprocess
 
     code = "import sys, alloc.allocators; sys.exit('pytest' in sys.modules)"

@@ -6,7 +6,7 @@ from alloc.problems import Allocation, Instance, evaluate
 
 
 def test_enough_is_the_least_ability_that_moves_the_bottleneck():
-    """With `enough` the next task is the last; with a little less the makespan is longer; with more it is the same."""
+    """With `enough` the next task is last; with slightly less the makespan is longer; with more it is the same."""
     instance = Instance(ability=[5, 5, 4], workload=[12, 4, 1])
     allocation = Allocation([0, 1, 2])
     found = explain(instance, allocation)
@@ -25,7 +25,7 @@ def test_enough_is_the_least_ability_that_moves_the_bottleneck():
 
 
 def test_travel_times_count_for_the_present_group():
-    """With finite speeds the group works from arrival on, and the further agent from hour 0 on."""
+    """With finite speeds the group works from its arrivals on, and the additional agent from hour 0 on."""
     instance = Instance(
         ability=[2, 1],
         workload=[6, 2],
@@ -40,7 +40,7 @@ def test_travel_times_count_for_the_present_group():
 
 
 def test_tied_bottlenecks():
-    """Where several tasks are last, no single agent gains anything."""
+    """If several tasks are last, no single agent gains anything."""
     found = explain(Instance(ability=[1, 2], workload=[2, 4]), Allocation([0, 1]))
     assert found.last == (0, 1)
     assert (found.enough, found.typical, found.next_task) == (None, None, None)
@@ -48,7 +48,7 @@ def test_tied_bottlenecks():
 
 
 def test_single_task():
-    """Without a next task there is only what a typical agent would gain."""
+    """Without a next task there is only the gain of a typical agent."""
     found = explain(Instance(ability=[1, 3], workload=[8, 0]), Allocation([0, 0]))
     assert (found.next_task, found.enough) == (None, None)
     assert (found.typical.ability, found.typical.makespan) == (2, 8 / 6)
@@ -62,5 +62,5 @@ def test_infeasible_agents_do_not_count():
 
 @pytest.mark.parametrize(("workload", "tasks"), [([1, 1], [0, 0]), ([0, 0], [0, 1])])
 def test_no_bottleneck(workload, tasks):
-    """Unserved tasks, or no work at all, hold no makespan up."""
+    """Unserved tasks, or no work at all, have no bottleneck."""
     assert explain(Instance(ability=[1, 3], workload=workload), Allocation(tasks)) is None

@@ -18,7 +18,7 @@ def instance() -> Instance:
 
 
 def test_front_matches_brute_force(instance: Instance) -> None:
-    """From the fastest to the cheapest of all, every point has the least energy within its makespan, and is proven."""
+    """From the fastest to the cheapest, every point has the least energy within its makespan, and is proven."""
     best = brute_force(instance)
     front = pareto(instance, "milp", points=8, time_limit_s=30)
     assert front.complete
@@ -35,7 +35,7 @@ def test_front_matches_brute_force(instance: Instance) -> None:
 
 
 def test_front_can_be_continued(instance: Instance) -> None:
-    """The makespans of the allocations to begin with are limits again, and nothing gets worse."""
+    """The makespans of the initial front are limits again, and no point gets worse."""
     first = pareto(instance, "milp", points=5, time_limit_s=30)
     known = [point.allocation for point in first.points if point.allocation is not None]
     again = pareto(instance, "milp", points=7, time_limit_s=30, starts=known)
@@ -49,7 +49,7 @@ def test_front_can_be_continued(instance: Instance) -> None:
 
 
 def test_stopped_run_keeps_the_front_so_far(instance: Instance) -> None:
-    """Once stopped there is the front so far, with a point at the least, and it says that it is not complete."""
+    """A stopped run has at least one point, and is marked as incomplete."""
     stop, seen = threading.Event(), []
 
     def second(result: Result) -> None:
@@ -63,7 +63,7 @@ def test_stopped_run_keeps_the_front_so_far(instance: Instance) -> None:
 
 
 def test_front_is_one_point_without_energy() -> None:
-    """Where flying costs nothing the fastest allocation is all there is; where a task stays unserved too."""
+    """If flying costs nothing, the fastest allocation is the only point; also if a task stays unserved."""
     free = Instance(ability=[1, 2, 3], workload=[3, 3])
     assert [point.makespan for point in pareto(free, "milp").points] == [1.0]
     unserved = Instance(ability=[1], workload=[1, 1], task_position=[[0, 0], [1, 1]], agent_position=[[3, 3]])
@@ -73,7 +73,7 @@ def test_front_is_one_point_without_energy() -> None:
 
 
 def test_methods_without_slack_are_refused(instance: Instance) -> None:
-    """A method that cannot trade time for energy says so, and a front without points is an error."""
+    """A method that cannot trade time for energy is refused, and a front without points is an error."""
     with pytest.raises(RefusedError, match="slack"):
         pareto(instance, "ga", iterations=1, time_limit_s=None)
     with pytest.raises(InputError, match="points"):
@@ -82,7 +82,7 @@ def test_methods_without_slack_are_refused(instance: Instance) -> None:
 
 @pytest.mark.parametrize("seed", range(5))
 def test_slowest_makespan_is_an_upper_bound(seed: int) -> None:
-    """Whoever goes where, with speeds or without, the last task is done by then."""
+    """For any allocation, with and without speeds, the last task is done by then."""
     rng = np.random.default_rng(seed)
     instance = Instance(
         ability=rng.uniform(1, 5, 4),

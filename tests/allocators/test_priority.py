@@ -36,7 +36,7 @@ def method(request: pytest.FixtureRequest) -> tuple[str, str | Allocator]:
 
 @pytest.mark.parametrize("objective", [Objective.MAKESPAN, Objective.MAKESPAN_ENERGY])
 def test_served_priority_is_maximal(method: tuple[str, str | Allocator], objective: Objective) -> None:
-    """As many tasks as can be are served, the most urgent, and by exact methods at the least makespan and energy."""
+    """As many tasks as possible are served, with most priority; exact methods have the least makespan and energy."""
     name, allocator = method
     for instance in SCARCE:
         if instance.has_travel_time and name != "auto" and not BUILT_IN[name].finite_speeds:
@@ -53,14 +53,14 @@ def test_served_priority_is_maximal(method: tuple[str, str | Allocator], objecti
 
 
 def test_one_agent_serves_the_more_urgent_task(method: tuple[str, str | Allocator]) -> None:
-    """Priority comes before work, and before a start that serves the other task."""
+    """Priority precedes work, and overrides a start that serves the other task."""
     instance = Instance(ability=[1], workload=[1, 50], priority=[1, 2])
     assert solve(instance, method[1], time_limit_s=1).allocation == Allocation([1])
     assert solve(instance, method[1], start=Allocation([0]), time_limit_s=1).allocation == Allocation([1])
 
 
 def test_equal_priorities_have_no_effect() -> None:
-    """Any one priority for all is the same as none: the same plan to the bit."""
+    """Any common priority gives the same plan as none, bit for bit."""
     for seed in range(30):
         instance = scarce_instance(seed)
         fields = {
@@ -73,7 +73,7 @@ def test_equal_priorities_have_no_effect() -> None:
 
 
 def test_order_of_objectives_with_priorities() -> None:
-    """A plan is better with fewer unserved tasks, then with less urgent ones, then with a shorter makespan."""
+    """Fewer unserved tasks, then less unserved priority, then a shorter makespan."""
     instance = Instance(ability=[1, 1], workload=[1, 5, 9, 2], priority=[1, 3, 3, 0])
     plans = [[1, 2], [2, 1], [1, 0], [0, 3], [1, 1], [3, 3]]
     scores = [evaluate(instance, Allocation(plan)) for plan in plans]

@@ -53,7 +53,7 @@ def run(method: str, after_s: float, how: str, times: int = 1) -> subprocess.Com
 
 @pytest.mark.parametrize("method", [MILP, pytest.param("cpsat", marks=pytest.mark.slow), GAPPO, "local-search"])
 def test_daemon_thread_is_stopped_and_awaited(method: str) -> None:
-    """However often it solves, its run is ended as by a stop event, the next is none, and nothing crashes."""
+    """Its run ends as by a stop event, further runs do not start, and nothing crashes."""
     ran = run(method, 0.8, "daemon", 1000)
     assert (ran.returncode, ran.stderr) == (0, "")
     assert set(ran.stdout.split("\n")) <= {"interrupted True", "proven True", "finished True", ""}
@@ -61,7 +61,7 @@ def test_daemon_thread_is_stopped_and_awaited(method: str) -> None:
 
 @pytest.mark.slow
 def test_interrupted_join_does_not_crash() -> None:
-    """Ctrl-C in `join`, after which some versions of Python take the other thread for ended: no abort."""
+    """After Ctrl-C in `join` some versions of Python consider the other thread ended: no abort."""
     ran = run("milp", 0.8, "interrupted")
     assert ran.returncode in (-signal.SIGINT, 130), ran.stderr
     assert ran.stderr.rstrip().endswith("KeyboardInterrupt")
@@ -69,7 +69,7 @@ def test_interrupted_join_does_not_crash() -> None:
 
 @pytest.mark.parametrize(("method", "after_s"), ENDS)
 def test_joined_thread_keeps_its_time_limit(method: str, after_s: float) -> None:
-    """The end of the program waits for it; that pools take no work by then costs no answer."""
+    """The end of the program waits for it, although pools no longer accept work by then."""
     ran = run(method, after_s, "joined")
     assert (ran.returncode, ran.stderr) == (0, "")
     assert ran.stdout == "time_limit True\n"
@@ -94,7 +94,7 @@ atexit.register(late)
 
 
 def test_pool_without_threads_runs_in_the_caller() -> None:
-    """Once it is shut down, work is done in the calling thread, and what that raises is raised by the future."""
+    """After shutdown, work is done in the calling thread, and exceptions are raised by the future."""
     pool = Pool(2)
     pool.shutdown()
     assert list(pool.map(lambda number: number + 1, [1, 2])) == [2, 3]

@@ -31,7 +31,7 @@ TWO = Instance(ability=[5, 3], workload=[6, 4])
 
 @pytest.mark.parametrize("name", list(registry.BUILT_IN))
 def test_built_in_methods_load(name: str) -> None:
-    """Every method that is listed can be loaded, and is described by the very entry it is listed under."""
+    """Every listed method can be loaded, and its description is that of its entry."""
     allocator = load(name)
     assert isinstance(allocator, Allocator)
     assert allocator.method is describe(name)
@@ -40,7 +40,7 @@ def test_built_in_methods_load(name: str) -> None:
 
 
 def test_unknown_names_get_a_hint() -> None:
-    """A slip gets the nearest name, for methods and options."""
+    """A misspelled method or option gets the most similar name."""
     with pytest.raises(InputError, match="did you mean 'greedy'"):
         load("gredy")
     with pytest.raises(InputError, match="did you mean 'policy'"):
@@ -51,7 +51,7 @@ def test_unknown_names_get_a_hint() -> None:
 
 
 def test_options_of_other_methods_are_refused() -> None:
-    """Whoever gives an option to the wrong method hears which one takes it, and no empty list of what is known."""
+    """The error for an option of another method says which method takes it."""
     takers = "gappo, gappo-ls, ppo, a2c, dqn, ddpg do"
     with pytest.raises(InputError, match=rf"'greedy' takes no option 'policy'; {takers}$"):
         load("greedy", policy="x")
@@ -60,12 +60,12 @@ def test_options_of_other_methods_are_refused() -> None:
 
 
 def test_options_of_none_are_ignored() -> None:
-    """A command line passes on all its options; those not given do not count."""
+    """Options that a command line passes on without a value do not count."""
     assert load("greedy", policy=None).method.name == "greedy"
 
 
 def test_missing_packages_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A method whose modules are not installed says what to install."""
+    """A method whose packages are not installed says what to install."""
     monkeypatch.setitem(registry.BUILT_IN, "greedy", Method(name="greedy", summary="", requires=("no_such_module",)))
     with pytest.raises(InputError, match="pip install no_such_module"):
         load("greedy")
@@ -100,7 +100,7 @@ def dice(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.usefixtures("dice")
 def test_parameters_reach_the_method() -> None:
-    """By name with one of them set, with all of them, or as an object: the method has what was given."""
+    """By name with one parameter, with all of them, or as an object: the method has the given values."""
     instance = Instance(ability=[1], workload=[1])
     for result in (
         solve(instance, "dice", faces=20),
@@ -126,7 +126,7 @@ def test_parameters_reach_the_method() -> None:
     ],
 )
 def test_wrong_parameters_are_errors_that_name_them(settings: dict[str, object], place: str, words: str) -> None:
-    """An unknown name gets the nearest one, a wrong value its parameter, at `load`, `solve` and the class alike."""
+    """An unknown name gets the most similar one, a wrong value its parameter, in `load`, `solve` and the class."""
     for run in (partial(load, "dice"), partial(solve, Instance(ability=[1], workload=[1]), "dice")):
         with pytest.raises(InputError, match=words) as caught:
             run(**settings)
@@ -137,7 +137,7 @@ def test_wrong_parameters_are_errors_that_name_them(settings: dict[str, object],
 
 
 def test_parameters_of_methods_without_any_are_refused() -> None:
-    """What would be ignored is an error."""
+    """Parameters that would be ignored are an error."""
 
     class Plain(Allocator):
         method = Method(name="plain", summary="for tests")
@@ -151,7 +151,7 @@ def test_parameters_of_methods_without_any_are_refused() -> None:
 
 
 def test_parameters_of_every_method_can_be_listed() -> None:
-    """Each built-in method tells what can be set, with defaults that it takes."""
+    """Each built-in method lists its parameters, with valid defaults."""
     assert {"policy": None, "device": "cpu"}.items() <= method_parameters("gappo").items()
     for name in ("greedy", "local-search", "ga", "hedonic", "auction", "lp-round"):
         load(name, **method_parameters(name))
@@ -159,14 +159,14 @@ def test_parameters_of_every_method_can_be_listed() -> None:
 
 @pytest.mark.parametrize("name", list(registry.BUILT_IN))
 def test_every_parameter_is_described(name: str) -> None:
-    """Each parameter of each method of ours has values, a default and a meaning in its docstring."""
+    """Each parameter of each built-in method has values, a default and a meaning in its docstring."""
     found = describe_parameters(name)
     assert {one.name: one.default for one in found} == method_parameters(name)
     assert [one.name for one in found if not (one.meaning and one.kind)] == []
 
 
 def test_unknown_parameter_error_lists_all_parameters() -> None:
-    """A name that is none, and one with a slip, both get the list of what the method takes; one line each."""
+    """For an unknown and for a misspelled name, the error lists all parameters in one line."""
     for given in ("colour", "populatoin"):
         with pytest.raises(InputError, match=r"known are population, population_genes, .*distance_weight$") as caught:
             solve(TWO, "ga", parameters={given: 1})
@@ -175,7 +175,7 @@ def test_unknown_parameter_error_lists_all_parameters() -> None:
 
 
 def test_parameters_are_in_the_result_and_its_label() -> None:
-    """However parameters come, the result states those that are not the defaults, and reads them back."""
+    """However parameters are given, the result has those that differ from their defaults, and reads them back."""
     ways = [
         solve(TWO, "ga", iterations=1, parameters={"population": 8, "smallest": 16}),
         solve(TWO, "ga", iterations=1, population=8),
@@ -191,6 +191,6 @@ def test_parameters_are_in_the_result_and_its_label() -> None:
 
 
 def test_rows_of_one_method_are_labelled_by_parameters() -> None:
-    """Two allocators of one method have rows of their own, named as ``alloc compare`` takes them."""
+    """Two allocators of one method have separate rows, named as ``alloc compare`` accepts them."""
     rows = list(compare([TWO], [GeneticAlgorithm(population=8), GeneticAlgorithm()], iterations=1))
     assert [row.method for row in rows] == ["ga[population=8]", "ga"]

@@ -62,7 +62,7 @@ def best_cost(number: int, objective: Objective, price: float) -> tuple[int, flo
     "method", [pytest.param(method, marks=[pytest.mark.slow] * (method in LONG)) for method in METHODS]
 )
 def test_moves_match_brute_force(method: str, objective: Objective, price: float) -> None:
-    """Exact methods find the least cost of moves with all pins kept, and no method claims less."""
+    """Exact methods find the least cost of moves with all pins, and no method reports less."""
     allocator = load(method)
     for number, (instance, plan, pins) in enumerate(cases()):
         if instance.has_travel_time and not BUILT_IN[method].finite_speeds:
@@ -95,7 +95,7 @@ def test_moves_match_brute_force(method: str, objective: Objective, price: float
 
 
 def test_plan_for_a_changed_instance_is_adapted() -> None:
-    """Agents and tasks that have gone are said and left out; those without a task move at no price."""
+    """Removed agents and tasks are reported and ignored; agents without a task move at no cost."""
     then = Instance(
         ability=[1, 2, 3, 4], workload=[2, 3, 4], task_position=[[0, 0], [1, 0], [2, 0]], start_task=[0] * 4
     )
@@ -121,7 +121,7 @@ def test_plan_for_a_changed_instance_is_adapted() -> None:
     ],
 )
 def test_invalid_arguments_are_refused(arguments: dict, message: str) -> None:
-    """What cannot be meant is refused before the run."""
+    """Invalid combinations are refused before the run."""
     instance = Instance(
         ability=[1, 1],
         workload=[1, 1],
@@ -134,7 +134,7 @@ def test_invalid_arguments_are_refused(arguments: dict, message: str) -> None:
 
 
 def test_proofs_with_pins_are_qualified() -> None:
-    """A bound with a pin is none without it: the result has its pins, and the summary says so."""
+    """Bounds hold only with the pins: the result lists them, and the summary says so."""
     instance = Instance(ability=[5, 1], workload=[10, 1])
     result = solve(instance, "cpsat", pins={"a1": "t2"})
     assert (result.status, result.makespan, dict(result.pins)) == ("optimal", 10.0, {"a1": "t2"})
@@ -147,7 +147,7 @@ def test_proofs_with_pins_are_qualified() -> None:
 @pytest.mark.parametrize("method", EXACT)
 @pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.slow), pytest.param(2, marks=pytest.mark.slow)])
 def test_energy_stage_minimises_costs(method: str, seed: int) -> None:
-    """Flights back of all cost what twice the energy does: the same optimum, proven, with many pairs."""
+    """Return flights of all agents cost twice the energy: the same optimum is proven."""
     rng = np.random.default_rng(seed)
     fields = {
         "ability": rng.integers(1, 10, 40),
@@ -162,7 +162,7 @@ def test_energy_stage_minimises_costs(method: str, seed: int) -> None:
 
 
 def test_improvements_refer_to_the_given_instance() -> None:
-    """Pinned agents are at their tasks in what the callback gets, and their flights count there and in the trace."""
+    """In callbacks, pinned agents are at their tasks, and their flights count there and in the trace."""
     instance = varied_instance(3, {"rates"})
     agent, task = next(iter(np.argwhere(instance.reach.mask[instance.reach.origin]).tolist()))
     told: list[Improvement] = []
@@ -181,7 +181,7 @@ def test_improvements_refer_to_the_given_instance() -> None:
 
 
 def test_pins_need_no_table_of_pairs() -> None:
-    """Where no cost counts, a pin is a list of one task: nothing needs a table of all pairs."""
+    """Without costs, a pin is a list of one task, which needs no table of all pairs."""
     rng = np.random.default_rng(0)
     instance = Instance(
         ability=np.ones(60_000),

@@ -50,12 +50,12 @@ def result(tasks: list[int], bound: float | None, energy_bound: float | None = N
     ],
 )
 def test_status_requires_proof_of_every_stage(arguments: tuple, status: Status) -> None:
-    """Optimal takes a proof of every stage of the objective, to 1e-6."""
+    """A result is optimal if every stage of the objective is proven to 1e-6."""
     assert result(*arguments).status is status
 
 
 def test_gaps_match_the_definition() -> None:
-    """(value - bound) / value, 0 where nothing is left to gain, none where there is nothing to compare."""
+    """(value - bound) / value, 0 if nothing can be gained, none if there is nothing to compare."""
     assert relative_gap(2.0, 1.5) == 0.25
     assert relative_gap(0.0, 0.0) == 0.0
     assert relative_gap(1.0, 1.1) == 0.0
@@ -64,7 +64,7 @@ def test_gaps_match_the_definition() -> None:
 
 
 def test_document_has_every_field() -> None:
-    """Every field of the format is there, every agent is assigned, and it is plain JSON."""
+    """Every field of the format is present, every agent is assigned, and it is plain JSON."""
     document = result([0, 1, -1], 1.0).to_dict()
     assert json.loads(json.dumps(document, allow_nan=False)) == document
     assert document["assignment"] == {"a1": "t1", "a2": "t2", "a3": None}
@@ -77,7 +77,7 @@ def test_document_has_every_field() -> None:
 
 
 def test_unserved_tasks_are_given_by_id() -> None:
-    """Tasks are told by id, and the makespan is null."""
+    """Unserved tasks are listed by id, and the makespan is null."""
     document = result([0, 0, 0], None).to_dict()
     assert document["unserved_tasks"] == ["t2"]
     assert (document["makespan"], document["gap"]) == (None, None)
@@ -148,7 +148,7 @@ def test_files_are_read_back(tmp_path: Path) -> None:
     ],
 )
 def test_wrong_documents_are_refused(tmp_path: Path, field: str, value: object, place: str) -> None:
-    """Each wrong field is named, and so is the file."""
+    """The error names the wrong field and the file."""
     good = result([0, 1, -1], 1.0)
     document = {**good.to_dict(), field: value}
     with pytest.raises(InputError) as caught:
@@ -161,14 +161,14 @@ def test_wrong_documents_are_refused(tmp_path: Path, field: str, value: object, 
 
 
 def test_result_of_another_instance_is_refused() -> None:
-    """A result does not pass for one of an instance on which its allocation scores otherwise."""
+    """A result is refused for an instance on which its allocation has other scores."""
     document = result([0, 1, -1], 1.0).to_dict()
     with pytest.raises(InputError, match=r"makespan: is 1\.33"):
         Result.from_dict(document, Instance(ability=[3, 2, 1], workload=[8, 2]))
 
 
 def test_str_is_the_summary() -> None:
-    """The text has status, makespan and bottleneck, and is that of the command line."""
+    """The text has status, makespan and bottleneck, as on the command line."""
     text = str(result([0, 1, -1], 1.0))
     assert text.startswith("three (3 agents, 2 tasks), test: every task is served; optimality is not proven\n")
     assert "makespan  1.33333 (at least 1, gap 25 %)" in text
@@ -176,7 +176,7 @@ def test_str_is_the_summary() -> None:
 
 
 def test_table_has_a_row_per_agent() -> None:
-    """Where each agent goes, how far that is, and when its task is done; nothing where there is no allocation."""
+    """Task, distance and completion time of each agent; nothing without an allocation."""
     pytest.importorskip("pandas")
     found = result([0, 1, -1], 1.0)
     frame = found.to_frame()

@@ -42,7 +42,7 @@ def far_and_wide() -> Instance:
 @pytest.mark.parametrize("method", ["ga", "gappo", "milp", "cpsat"])
 @pytest.mark.parametrize("objective", OBJECTIVES)
 def test_refusals_are_fast(far_and_wide: Instance, method: str, objective: Objective) -> None:
-    """A method that cannot hold a table of all pairs says so before anybody builds one, and names its limit."""
+    """A method that cannot hold a table of all pairs refuses before building one, and names its limit."""
     allocator = load(method)
     instance = far_and_wide
     instance.reach.is_complete  # noqa: B018 - what any method needs
@@ -61,7 +61,7 @@ def test_refusals_are_fast(far_and_wide: Instance, method: str, objective: Objec
     ],
 )
 def test_greedy_with_complete_reach_is_near_the_bound(starts: str, objective: Objective) -> None:
-    """200,000 agents and 2,500 tasks: within a tenth of a per cent of the bound, whatever the agents begin at."""
+    """200,000 agents and 2,500 tasks: within 0.1 % of the bound, for any starts."""
     instance = random_instance(Family(agents=200_000, tasks=2_500, starts=starts), 0)
     result = solve(instance, "greedy", objective=objective, time_limit_s=60)
     assert result.gap is not None
@@ -71,7 +71,7 @@ def test_greedy_with_complete_reach_is_near_the_bound(starts: str, objective: Ob
 
 
 def test_repair_after_zero_time_serves_tasks(far_and_wide: Instance) -> None:
-    """The repair after a run that had no time takes seconds at the most, where everyone reaches everything or not."""
+    """The repair after a run without time takes at most seconds, with complete and with limited reach."""
     free = Instance(
         ability=np.ones(300_000), workload=np.ones(5_000), task_position=np.random.default_rng(0).random((5_000, 3))
     )
@@ -82,7 +82,7 @@ def test_repair_after_zero_time_serves_tasks(far_and_wide: Instance) -> None:
 
 
 def test_auto_picks_without_delay(far_and_wide: Instance) -> None:
-    """What cannot be held is not picked."""
+    """Methods that cannot hold the instance are not picked."""
     begin = time.process_time()
     for objective in OBJECTIVES:
         method, _ = choose(far_and_wide, objective, Budget(10))

@@ -38,7 +38,7 @@ def scarce(seed: int) -> Instance:
 
 
 def test_smallest_tasks_are_served_with_complete_reach(method):
-    """The optimum of n agents for more tasks: the n smallest workloads against the abilities, both sorted."""
+    """The optimum of n agents for more tasks: the n smallest workloads and the abilities, both sorted."""
     for seed in range(3):
         rng = np.random.default_rng(seed)
         n, m = int(rng.integers(2, 40)), int(rng.integers(41, 200))
@@ -53,7 +53,7 @@ def test_smallest_tasks_are_served_with_complete_reach(method):
 
 @pytest.mark.parametrize("objective", ["makespan", "makespan-energy"])
 def test_short_reach_matches_brute_force(method, objective):
-    """Exact methods serve as brute force does, at the same energy; the others are at most 1.5 times slower."""
+    """Exact methods equal brute force, with the same energy; the others are at most 1.5 times slower."""
     name, allocator = method
     for seed in range(12):
         instance = scarce(seed)
@@ -73,7 +73,7 @@ def test_short_reach_matches_brute_force(method, objective):
 
 
 def test_start_that_serves_less_is_improved(method):
-    """A warm start that serves the wrong tasks is left behind, and no agent stays where it cannot go."""
+    """A warm start that serves the wrong tasks is improved, and all agents are within reach."""
     instance = scarce(5)
     best = brute_force(instance)
     start = Allocation(np.zeros(instance.n, dtype=int))

@@ -44,7 +44,7 @@ def instance() -> Instance:
 
 
 def test_proposals_are_scored_by_the_evaluator(instance: Instance) -> None:
-    """The makespan is the evaluator's, and proof comes from the bounds alone."""
+    """The makespan is the evaluator's, and proofs come only from bounds."""
     result = solve(instance, Answers(Proposal(Allocation([0, 1, 0]))))
     assert (result.makespan, result.status, result.stop_reason) == (1.0, Status.OPTIMAL, StopReason.PROVEN)
     poor = solve(instance, Answers(Proposal(Allocation([0, 1, -1]))))
@@ -57,7 +57,7 @@ def test_proposals_are_scored_by_the_evaluator(instance: Instance) -> None:
 
 
 def test_runs_with_iteration_limits_use_one_thread(instance: Instance) -> None:
-    """Iterations without a time limit mean the same on every machine: one thread unless more are asked for."""
+    """Without a time limit runs are the same on every machine: one thread unless more are requested."""
     seen = []
 
     class Counts(Answers):
@@ -73,14 +73,14 @@ def test_runs_with_iteration_limits_use_one_thread(instance: Instance) -> None:
 
 
 def test_unserved_tasks_are_repaired(instance: Instance) -> None:
-    """A method that forgets a task is mended, whatever else it left."""
+    """A task that a method leaves unserved is served."""
     result = solve(instance, Answers(Proposal(Allocation([0, 0, 0]))))
     assert result.evaluation is not None
     assert result.evaluation.unserved_tasks == ()
 
 
 def test_infeasible_result_has_a_plan_and_a_reason(contested: Instance) -> None:
-    """Where no allocation serves all, the best partial plan comes along and the tasks that compete are named."""
+    """If no allocation serves all tasks, the best partial plan is returned and the competing tasks are named."""
     result = solve(contested, "greedy")
     assert result.status is Status.INFEASIBLE
     assert (result.makespan, result.lower_bound, result.gap) == (None, None, None)
@@ -90,20 +90,20 @@ def test_infeasible_result_has_a_plan_and_a_reason(contested: Instance) -> None:
 
 
 def test_task_without_able_agent_is_explained() -> None:
-    """The reason is put simply where it is simple."""
+    """A simple reason is stated simply."""
     result = solve(Instance(ability=[1], workload=[1], allowed_tasks=[[]]), "greedy")
     assert result.notes == ("no agent can take task 't1'",)
     assert result.status is Status.INFEASIBLE
 
 
 def test_proposing_nothing_gives_no_solution(instance: Instance) -> None:
-    """A method that proposes nothing has no solution, and no makespan."""
+    """A method that proposes nothing has no solution and no makespan."""
     result = solve(instance, Answers(Proposal()))
     assert (result.status, result.allocation, result.makespan) == (Status.NO_SOLUTION, None, None)
 
 
 def test_optimality_requires_proof_of_energy(instance: Instance) -> None:
-    """At the least makespan, but with energy that is not known to be the least, a run is finished, not proven."""
+    """At the least makespan without a proven energy, a run is finished but not proven."""
     far = Instance(
         ability=[1, 2, 3], workload=[3, 3], task_position=[[1, 0], [0, 0]], start_task=[1, 0, 0], energy_per_distance=1
     )
@@ -116,7 +116,7 @@ def test_optimality_requires_proof_of_energy(instance: Instance) -> None:
 
 
 def test_zero_energy_is_proven() -> None:
-    """Where nobody flies the energy is proven, also where no linear programme of this size is solved."""
+    """If no agent flies the energy is proven, also without a linear programme of this size."""
     rng = np.random.default_rng(0)
     large = Instance(ability=rng.uniform(1, 2, 3000), workload=np.ones(300), allowed_tasks=[[0]] + [None] * 2999)
     answers = Answers(Proposal(Allocation(np.arange(3000) % 300)))
@@ -126,7 +126,7 @@ def test_zero_energy_is_proven() -> None:
 
 
 def test_refusals_are_raised_beforehand(instance: Instance) -> None:
-    """The objective, finite speeds and the method's own reason refuse beforehand, and say why."""
+    """Unsupported objectives and speeds, and the method's own reason, are refused with an explanation."""
     idle = Proposal(Allocation.idle(instance))
     with pytest.raises(RefusedError, match="does not optimise makespan-energy"):
         solve(instance, Answers(idle), objective="makespan-energy")
@@ -139,13 +139,13 @@ def test_refusals_are_raised_beforehand(instance: Instance) -> None:
 
 
 def test_warm_start_is_never_lost(instance: Instance) -> None:
-    """An answer worse than the warm start gives way to it."""
+    """An answer worse than the warm start is replaced by it."""
     result = solve(instance, Answers(Proposal(Allocation([1, 0, 1]))), start=Allocation([0, 1, 0]))
     assert result.makespan == 1.0
 
 
 def test_infeasible_starts_are_repaired() -> None:
-    """Agents that can no longer go where a start has them do not go there in the answer."""
+    """Agents of a start that can no longer do their task are not sent there."""
     instance = Instance(ability=[1, 2, 3], workload=[3, 3], allowed_tasks=[[0], [0], [1]])
     result = solve(instance, Answers(Proposal()), start=Allocation([1, 0, 1]))
     assert result.evaluation is not None
@@ -153,7 +153,7 @@ def test_infeasible_starts_are_repaired() -> None:
 
 
 def test_stop_event_ends_a_run(instance: Instance) -> None:
-    """An event that is set ends a run that would have gone on for a minute, and says so."""
+    """A stop event ends a run long before its limit, with the corresponding reason."""
     stop = threading.Event()
     hard = Instance(ability=np.random.default_rng(0).uniform(1, 10, 40), workload=[3.3, 5.9, 7.1, 9.7])
     timer = threading.Timer(0.2, stop.set)
@@ -166,7 +166,7 @@ def test_stop_event_ends_a_run(instance: Instance) -> None:
 
 
 def test_callback_exceptions_end_a_run(instance: Instance) -> None:
-    """What a callback raises reaches the caller."""
+    """An exception of a callback reaches the caller."""
 
     def enough(step: Improvement) -> None:
         raise RuntimeError(f"T = {step.evaluation.makespan:g}")
@@ -176,7 +176,7 @@ def test_callback_exceptions_end_a_run(instance: Instance) -> None:
 
 
 def test_parameters_with_an_allocator_object_are_refused(instance: Instance) -> None:
-    """An allocator has its parameters already: more of them are an error, not lost."""
+    """An allocator already has its parameters: further ones are an error."""
     with pytest.raises(InputError, match="with its own parameters; set policy when creating it"):
         solve(instance, load("greedy"), policy="x.safetensors")
     with pytest.raises(InputError, match="takes no option 'policy'"):
@@ -184,7 +184,7 @@ def test_parameters_with_an_allocator_object_are_refused(instance: Instance) -> 
 
 
 def test_auto_takes_no_parameters(instance: Instance) -> None:
-    """What it picks depends on the size: an option that one method takes needs that method's name."""
+    """The method picked by auto depends on the size: a parameter requires naming the method."""
     with pytest.raises(InputError, match="needs a named method that has it"):
         solve(instance, "auto", policy="x.safetensors")
     assert solve(instance, "auto", policy=None).makespan == 1.0
@@ -192,13 +192,13 @@ def test_auto_takes_no_parameters(instance: Instance) -> None:
 
 @pytest.mark.parametrize("wrong", [{"seed": -1}, {"seed": 2**63}, {"threads": 0}, {"threads": 10**20}])
 def test_seeds_and_threads_out_of_range_are_refused(instance: Instance, wrong: dict[str, int]) -> None:
-    """Seeds and threads out of range are told beforehand, by every method alike."""
+    """Invalid seeds and numbers of threads are refused beforehand for every method."""
     with pytest.raises(InputError, match="must be a whole number from"):
         solve(instance, "greedy", **wrong)
 
 
 def test_target_gap_uses_the_best_bound() -> None:
-    """Reach alone makes one task long: the simple bounds miss it, and the run still ends at the gap asked for."""
+    """If reach makes one task long, the simple bounds are weak, and the run still ends at the target gap."""
     hard = Instance(
         ability=[1.1, 1.7, 2.3, 3.1, 4.9, 9.7], workload=[3.3, 5.9, 1.0], allowed_tasks=[[0, 1]] * 5 + [[2]]
     )
@@ -210,12 +210,12 @@ def test_target_gap_uses_the_best_bound() -> None:
 
 
 def test_auto_names_the_method_it_picked(instance: Instance) -> None:
-    """The result carries the name of the method that ran, and the reason."""
+    """The result has the name of the method that ran, and the reason."""
     result = solve(instance, "auto")
     assert result.method != "auto"
     assert any(f"auto picked {result.method}" in note for note in result.notes)
 
 
 def test_notes_of_the_method_are_in_the_result(instance: Instance) -> None:
-    """The notes of a proposal stand in the result."""
+    """The notes of a proposal are in the result."""
     assert solve(instance, Answers(Proposal(Allocation([0, 1, 0]), notes=("12 messages",)))).notes == ("12 messages",)

@@ -22,13 +22,13 @@ from alloc.problems.generate import paper
     ],
 )
 def test_abilities_are_rounded_up(ability, whole, text):
-    """What is said to be enough is enough, and long numbers look as elsewhere."""
+    """The stated ability suffices, and long numbers are formatted as elsewhere."""
     assert float(text) >= ability
     assert rounded_up(ability, whole=whole) == text
 
 
 def test_tied_bottlenecks_gain_nothing():
-    """Tasks that are last together are named, and one more agent on one of them gains nothing."""
+    """Tied tasks are named, and one more agent on one of them gains nothing."""
     lines = bottleneck_lines(solve(Instance(ability=[2, 2], workload=[2, 2]), "greedy", handle_signals=False))
     assert lines[0].startswith("Bottleneck: 2 of 2 tasks together, at 1: t1, t2")
     assert "gains nothing" in lines[1]
@@ -36,13 +36,13 @@ def test_tied_bottlenecks_gain_nothing():
 
 
 def test_single_task_reports_the_gain_of_a_median_agent():
-    """Without a next task there is no ability that is enough; the median agent stands in."""
+    """Without a next task no ability is enough; the gain of a median agent is reported instead."""
     lines = bottleneck_lines(solve(Instance(ability=[3], workload=[6]), "greedy", handle_signals=False))
     assert "of ability 3, the median, gains 50 %: 1." in lines[1]
 
 
 def test_finite_speeds_are_mentioned():
-    """With travel times the further agent is said to be there at once."""
+    """With travel times the summary says that the additional agent starts at the task."""
     instance = Instance(
         ability=[3, 1], workload=[6, 1], speed=[1, 1], agent_position=[[0, 0], [0, 1]], task_position=[[1, 0], [0, 1]]
     )
@@ -52,7 +52,7 @@ def test_finite_speeds_are_mentioned():
 
 
 def test_singular_forms():
-    """One of a kind is not told as several."""
+    """One agent and one task are in the singular."""
     result = solve(Instance(name="one", ability=[3], workload=[6]), "greedy", handle_signals=False)
     assert summary(result).startswith("one (1 agent, 1 task), greedy: ")
 
@@ -65,7 +65,7 @@ def test_no_work_is_no_bottleneck():
 
 
 def test_slack_qualifies_the_bottleneck():
-    """With slack the cheapest allocation is proven, but the same agents may well be done sooner."""
+    """With slack the cheapest allocation is proven, but the same agents may well be faster."""
     instance = Instance(
         ability=[1, 1, 1], workload=[3, 1], task_position=[[0, 0], [9, 0]], agent_position=[[0, 0], [9, 0], [9, 0]]
     )
@@ -88,7 +88,7 @@ def test_slack_qualifies_the_bottleneck():
     ],
 )
 def test_headline_distinguishes_kinds_of_unserved_tasks(sites, text):
-    """Tasks that compete for two agents are told apart from those that no agent can take."""
+    """Tasks that compete for two agents are distinguished from tasks that no agent can take."""
     instance = Instance(
         ability=[1, 1],
         workload=[1] * len(sites),
@@ -101,7 +101,7 @@ def test_headline_distinguishes_kinds_of_unserved_tasks(sites, text):
 
 @pytest.mark.parametrize("scenario", [1, 4])
 def test_summary_is_short(scenario: int) -> None:
-    """A result is printed in fewer than 15 lines, whatever its size and its unserved tasks, an instance in one."""
+    """A result has fewer than 15 lines, whatever its size and unserved tasks; an instance has one."""
     instance = paper(scenario, seed=1)
     lonely = Instance(ability=np.ones(40), workload=np.ones(60))
     for one in (instance, lonely):
@@ -112,7 +112,7 @@ def test_summary_is_short(scenario: int) -> None:
 
 
 def test_names_cannot_break_lines():
-    """Line breaks and control characters in names are spaces in the summary."""
+    """Line breaks and control characters in names become spaces in the summary."""
     instance = Instance(agent_ids=["a\n1", "b\x1b[2J"], task_ids=["t\r1", "u\n"], ability=[1, 3], workload=[2, 3])
     text = summary(solve(instance, "greedy", handle_signals=False))
     assert "\x1b" not in text

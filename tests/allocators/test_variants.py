@@ -27,7 +27,7 @@ def combined_instance(number: int) -> Instance:
 
 @pytest.mark.parametrize("seed", range(300))
 def test_reach_and_scores_match_brute_force(seed: int) -> None:
-    """Distances, who can take what, and the energy of an allocation are those of the definitions."""
+    """Distances, reachability and energy of an allocation match the definitions."""
     instance = varied_instance(seed)
     distance, able = reachable(instance)
     energy = flight_energies(instance, distance)
@@ -47,7 +47,7 @@ def test_reach_and_scores_match_brute_force(seed: int) -> None:
 @pytest.mark.parametrize("objective", OBJECTIVES)
 @pytest.mark.parametrize("method", EXACT)
 def test_exact_methods_find_the_optimum(method: str, objective: Objective) -> None:
-    """Exact methods equal brute force, each field alone and all together, and bounds hold."""
+    """Exact methods equal brute force, with each field alone and all together, and bounds hold."""
     allocator = load(method)
     for number in range(len(COMBINATIONS)):
         instance = combined_instance(number)
@@ -68,7 +68,7 @@ def test_exact_methods_find_the_optimum(method: str, objective: Objective) -> No
 @pytest.mark.parametrize("objective", OBJECTIVES)
 @pytest.mark.parametrize("method", [pytest.param(one, marks=[pytest.mark.slow] * (one == "gappo")) for one in OTHERS])
 def test_all_methods_give_feasible_plans(method: str, objective: Objective) -> None:
-    """Every method serves as many tasks as can be, sends nobody astray, and beats no optimum."""
+    """Every method serves as many tasks as possible with a feasible plan, and none is better than the optimum."""
     allocator = load(method)
     for number in range(len(COMBINATIONS)):
         instance = combined_instance(number)

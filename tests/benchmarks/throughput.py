@@ -166,7 +166,9 @@ def ways(counts: Sequence[int]) -> None:
     torch.set_num_threads(1)
     torch.manual_seed(0)
     network = ActorCritic()
-    print("| agents/tasks | game | decisions/s | relative to PettingZoo | relative to the prototype | bids compared/s |")
+    print(
+        "| agents/tasks | game | decisions/s | relative to PettingZoo | relative to the prototype | bids compared/s |"
+    )
     print("|---|---|--:|--:|--:|--:|")
     for size, count in ((size, count) for count in counts for size in SIZES):
         instances, board = lay_out(size, count, 0.5)

@@ -20,13 +20,13 @@ class Sample(CheckedParameters):
 
 
 def test_defaults_and_replacements():
-    """Settings replace fields of the parameters given, and of the defaults where there are none."""
+    """Given settings replace fields of the given parameters, or else of the defaults."""
     assert with_settings(Sample, None, {}) == Sample()
     assert with_settings(Sample, Sample(size=4), {"name": "b"}) == Sample(size=4, name="b")
 
 
 def test_defaults_of_a_class_with_slots():
-    """Parameters without a dictionary of their own tell their defaults, and what differs from them."""
+    """Defaults and changed parameters are also found for classes with slots."""
 
     @dataclass(frozen=True, slots=True)
     class Slotted:
@@ -45,7 +45,7 @@ def test_defaults_of_a_class_with_slots():
 
 
 def test_values_are_converted_to_python_types():
-    """Numpy's scalars, integers for floats and lists for tuples are converted."""
+    """NumPy scalars, integers for floats and lists for tuples are converted."""
     settings = {"size": np.int64(2), "rate": 1, "radius": np.float32(2), "steps": [1, np.float64(2)], "fast": np.True_}
     found = with_settings(Sample, None, settings)
     assert found == Sample(2, 1.0, 2.0, (1.0, 2.0), True)
@@ -73,7 +73,7 @@ def test_wrong_values_are_errors_that_name_the_parameter(name, value):
 
 
 def test_unknown_names_get_a_hint():
-    """An unknown parameter is an error that names it, and one that it may be."""
+    """An unknown parameter is an error that names it and a similar valid one."""
     with pytest.raises(InputError, match="'size'") as caught:
         with_settings(Sample, None, {"sise": 1})
     assert caught.value.place == "sise"

@@ -22,7 +22,7 @@ def search(instance: Instance, objective: Objective = Objective.MAKESPAN, **limi
 
 @pytest.mark.parametrize("field", ["time_limit_s", "iterations", "target_gap"])
 def test_negative_budgets_are_refused(field: str) -> None:
-    """Neither negative nor NaN nor infinite; nothing at all is allowed, and so is no limit."""
+    """Negative, NaN and infinite budgets are refused; zero and no limit are valid."""
     for wrong in (-1, float("nan"), float("inf")):
         with pytest.raises(InputError):
             Budget(**{field: wrong})
@@ -31,7 +31,7 @@ def test_negative_budgets_are_refused(field: str) -> None:
 
 
 def test_best_plan_is_kept(instance: Instance) -> None:
-    """What is better replaces what was best, is traced and told; what is not, is scored only."""
+    """A better plan replaces the best one, is traced and reported; a worse one is only scored."""
     told: list[Improvement] = []
     run = Search(instance, Objective.MAKESPAN, Budget(None), on_improvement=told.append)
     one, worse, two = Allocation([0, 1, -1]), Allocation([-1, 1, 0]), Allocation([0, 1, 0])
@@ -45,7 +45,7 @@ def test_best_plan_is_kept(instance: Instance) -> None:
 
 
 def test_stop_reasons(instance: Instance) -> None:
-    """Each limit ends a run for its own reason, and a run without limits goes on until it is proven."""
+    """Each limit ends a run with its own reason; without limits, a run continues until optimality is proven."""
     assert search(instance).stop_reason() is None
     assert search(instance, time_limit_s=0).stop_reason() is StopReason.TIME_LIMIT
     counted = search(instance, iterations=2)
@@ -62,7 +62,7 @@ def test_stop_reasons(instance: Instance) -> None:
 
 
 def test_run_continues_while_energy_may_fall(instance: Instance) -> None:
-    """At the least makespan, energy may still fall, unless it is 0."""
+    """At the least makespan, a run continues while the energy may decrease, that is unless it is 0."""
     run = search(instance, Objective.MAKESPAN_ENERGY)
     run.submit(Allocation([0, 1, 0]))
     assert run.stop_reason() is None
@@ -85,7 +85,7 @@ def test_clock_starts_with_the_run_and_an_event_ends_it(instance: Instance) -> N
 
 
 def test_bounds_never_decrease(instance: Instance) -> None:
-    """A weaker bound changes nothing, and an unserved task leaves the gap at 1."""
+    """A weaker bound changes nothing, and an unserved task keeps the gap at 1."""
     run = search(instance)
     run.raise_bound(0.5)
     assert run.lower_bound == 1.0
@@ -104,7 +104,7 @@ def test_warm_start_is_the_first_incumbent(instance: Instance) -> None:
 
 
 def test_cheapest_plan_within_slack_is_best(instance: Instance) -> None:
-    """Within the slack the cheapest is the best, whatever comes later and is faster."""
+    """Within the slack the cheapest plan is the best, even if a faster one follows."""
     run = Search(instance, Objective.MAKESPAN_ENERGY, Budget(None), tolerance=MakespanTolerance(slack=0.4))
     slow, middle, fast = Allocation([0, 1, -1]), Allocation([0, 0, 1]), Allocation([0, 1, 0])
     for allocation, best in ((slow, slow), (middle, slow), (fast, slow)):
@@ -117,7 +117,7 @@ def test_cheapest_plan_within_slack_is_best(instance: Instance) -> None:
 
 
 def test_second_best_returns_when_the_cheapest_leaves_the_slack() -> None:
-    """The cheapest leaves the slack; the one that was second then is the best, not merely the fastest."""
+    """If the cheapest plan leaves the slack, the second cheapest is the best, not merely the fastest."""
     instance = Instance(ability=[4, 2, 1], workload=[4], task_position=[[3, 0]], agent_position=[[0, 0]] * 2 + [[2, 0]])
     run = Search(instance, Objective.MAKESPAN_ENERGY, Budget(None), tolerance=MakespanTolerance(slack=0.5))
     for plan in ([-1, -1, 0], [-1, 0, -1], [0, -1, -1], [0, 0, 0], [0, -1, 0]):
@@ -129,7 +129,7 @@ def test_second_best_returns_when_the_cheapest_leaves_the_slack() -> None:
 
 
 def test_below_the_makespan_limit_energy_decides(instance: Instance) -> None:
-    """Up to the limit energy alone counts; beyond it, the makespan still does."""
+    """Up to the limit only the energy counts; beyond it, the makespan."""
     run = Search(instance, Objective.MAKESPAN_ENERGY, Budget(None), tolerance=MakespanTolerance(limit=1.5))
     far, cheap = Allocation([1, 0, 0]), Allocation([0, 1, -1])
     run.submit(far)  # T = 4/3 for energy 1
@@ -142,13 +142,13 @@ def test_below_the_makespan_limit_energy_decides(instance: Instance) -> None:
 
 @pytest.mark.parametrize("wrong", [{"slack": -0.1}, {"slack": float("nan")}, {"limit": 0.0}, {"limit": float("inf")}])
 def test_slack_and_limit_are_validated(wrong: dict[str, float]) -> None:
-    """Slack is finite and not negative, a limit finite and positive."""
+    """Slack must be finite and not negative, a limit finite and positive."""
     with pytest.raises(InputError):
         MakespanTolerance(**wrong)
 
 
 def test_failing_stage_keeps_the_incumbent(instance: Instance, caplog: pytest.LogCaptureFixture) -> None:
-    """With a plan at hand, its exception is logged and noted; without one it is raised."""
+    """With an incumbent, the exception of a stage is logged and noted; without one it is raised."""
     run = Search(instance, Objective.MAKESPAN, Budget())
     with pytest.raises(ZeroDivisionError), run.improving("polishing"):
         raise ZeroDivisionError
@@ -160,7 +160,7 @@ def test_failing_stage_keeps_the_incumbent(instance: Instance, caplog: pytest.Lo
 
 
 def test_callback_exceptions_propagate_through_every_stage(instance: Instance) -> None:
-    """It ends the run, though it is raised where failures are met."""
+    """An exception of a callback ends the run, even in a stage whose failures are tolerated."""
 
     def enough(_: object) -> None:
         raise ZeroDivisionError

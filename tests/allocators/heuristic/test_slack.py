@@ -22,7 +22,7 @@ def notes_on_slack(result):
 
 
 def test_noted_saving_is_reached_with_slack():
-    """At the least makespan of real-valued abilities energy is high, and a run with slack saves what the note says."""
+    """At the least makespan of real abilities energy is high, and a run with slack saves what the note says."""
     result = solve(REAL, objective="makespan-energy", **SETTINGS)
     (note,) = notes_on_slack(result)
     saving, energy, makespan = re.fullmatch(
@@ -46,13 +46,13 @@ def test_noted_saving_is_reached_with_slack():
     ],
 )
 def test_note_on_slack_appears_only_where_useful(instance, settings):
-    """Whole abilities, a run for the makespan alone or with slack, and methods without search have no such note."""
+    """Integer abilities, the makespan objective, runs with slack, and methods without search have no such note."""
     assert notes_on_slack(solve(instance, **{**SETTINGS, **settings})) == []
 
 
 @pytest.mark.parametrize("limit", [None, 60])
 def test_small_instances_are_searched_briefly(limit, monkeypatch):
-    """Each search makes an iteration for each agent at the most, however much time there is."""
+    """Each search makes at most one iteration per agent, however much time there is."""
     made = []
 
     def counted(part):

@@ -57,7 +57,7 @@ def states(board: Board) -> Iterator[State]:
 
 @pytest.mark.parametrize("name", BOARDS)
 def test_scores_match_the_cpu(name: str) -> None:
-    """Bids, reserve and value agree to single precision, in any state."""
+    """Bids, reserve and value agree within single precision in any state."""
     board, (here, there) = BOARDS[name](), pair()
     for state in states(board):
         away = State(*(part.to("cuda") for part in vars(state).values()))
@@ -78,7 +78,7 @@ def test_greedy_games_match_the_cpu(name: str, total: bool) -> None:
 
 
 def test_sampled_games_are_reproducible() -> None:
-    """Drawn games are legal, and the same again by the same seed, to the last bit."""
+    """Sampled games are legal, and reproducible bit for bit by seed."""
     board, (_, there) = BOARDS["ranged"](), pair()
     games = games_on(board, 50)
     first, again, other = (play_games(there, board, games, rounds=8, temperature=1.0, seed=seed) for seed in (1, 1, 2))
@@ -89,7 +89,7 @@ def test_sampled_games_are_reproducible() -> None:
 
 
 def test_sums_are_reproducible() -> None:
-    """What agents bring to a place adds up to the same, to the last bit, in any number of games, and as on the CPU."""
+    """Sums over the agents at a place are equal bit for bit for any batch size, and on the CPU."""
     generator = torch.Generator().manual_seed(0)
     values = torch.rand(64, 300, 5, generator=generator)
     place = torch.randint(7, (64, 300), generator=generator)
@@ -101,7 +101,7 @@ def test_sums_are_reproducible() -> None:
 
 @pytest.mark.parametrize("method", METHODS)
 def test_plans_are_valid_and_reproducible(method: str) -> None:
-    """Counted in sweeps, every method answers every instance twice the same, with one thread and with two."""
+    """With a sweep budget, every method gives the same answer twice, with one thread and with two."""
     policy = load(method, device="cuda")
     for name, instance in INSTANCES.items():
         first, again = (
@@ -115,7 +115,7 @@ def test_plans_are_valid_and_reproducible(method: str) -> None:
 
 
 def test_time_limit_is_respected() -> None:
-    """A run ends in time, large boards included, and answers."""
+    """A run ends in time with an answer, also on large boards."""
     policy = load("gappo", device="cuda")
     for instance in (INSTANCES["paper"], paper_like(500, 50, 2400, seed=1)):
         result = solve(instance, policy, objective="makespan-energy", time_limit_s=0.5)
@@ -124,7 +124,7 @@ def test_time_limit_is_respected() -> None:
 
 
 def test_board_of_many_games_matches_single_games() -> None:
-    """Thousands of games at once end as they do alone."""
+    """Thousands of games at once end as single ones."""
     board, (_, there) = layout(*(paper_like(30, 6, 130, seed) for seed in range(4))), pair()
     many = play_games(there, board, games_on(board, 1000), rounds=12)
     alone = play_games(there, board, games_on(board), rounds=12)

@@ -34,7 +34,7 @@ def gappo() -> Allocator:
 
 @pytest.mark.parametrize("name", SHIPPED)
 def test_greedy_game_is_near_the_optimum_on_paper_instances(name: str) -> None:
-    """One greedy game, before any search: T is within 15 % of the optimum on three instances of scenario 1."""
+    """One greedy game without search is within 15 % of the optimum on three instances of scenario 1."""
     policy = load(name)
     for seed in range(3):
         makespan = solve(paper(1, seed), policy, iterations=0, time_limit_s=None).makespan
@@ -43,14 +43,14 @@ def test_greedy_game_is_near_the_optimum_on_paper_instances(name: str) -> None:
 
 
 def test_regional_games_reach_the_bound(gappo: Allocator) -> None:
-    """A few sweeps bring T to 1 on a small instance like the paper's, which proves it optimal."""
+    """A few sweeps reach T = 1 on a small instance like the paper's, which proves it optimal."""
     result = solve(paper_like(40, 8, 160, seed=3), gappo, iterations=40, time_limit_s=None)
     assert result.makespan == 1.0
     assert result.status is Status.OPTIMAL
 
 
 def test_energy_objective_saves_energy(gappo: Allocator) -> None:
-    """With energy in the objective the same policy flies less than without, and slack saves more."""
+    """With energy in the objective the policy flies less, and slack saves more."""
     instance = paper_like(40, 8, 160, seed=3)
     results = [
         solve(instance, gappo, objective=goal, iterations=10, time_limit_s=None, makespan_slack=slack)
@@ -62,7 +62,7 @@ def test_energy_objective_saves_energy(gappo: Allocator) -> None:
 
 
 def test_reach_and_speed_are_respected(gappo: Allocator) -> None:
-    """With short ranges, travel times and own positions no agent is sent too far, and T is near the bound."""
+    """With short ranges, travel times and positions, plans are feasible, and T is near the bound."""
     for family in (
         Family(agents=60, tasks=12, starts="own", communication_range=(0.3, 0.6), battery=None),
         Family(agents=60, tasks=12, starts="own", speed=(0.5, 2.0), battery=None),
@@ -74,7 +74,7 @@ def test_reach_and_speed_are_respected(gappo: Allocator) -> None:
 
 
 def test_same_seed_gives_same_answer(gappo: Allocator) -> None:
-    """Counted in sweeps, a run is reproducible, from several threads at once too."""
+    """With a sweep budget, a run is reproducible, also from several threads at once."""
     instance = paper_like(30, 6, 120, seed=9)
     answers: list[Allocation | None] = [None] * 3
 
@@ -92,7 +92,7 @@ def test_same_seed_gives_same_answer(gappo: Allocator) -> None:
 
 
 def test_global_generators_are_not_used(gappo: Allocator) -> None:
-    """A run draws from its own generators, and leaves torch's thread count as it was."""
+    """A run uses its own generators, and keeps torch's thread count."""
     threads, before = torch.get_num_threads(), torch.random.get_rng_state()
     solve(paper_like(30, 6, 120, seed=9), gappo, iterations=2, time_limit_s=None)
     assert torch.equal(torch.random.get_rng_state(), before)
@@ -118,7 +118,7 @@ def test_local_search_continues_from_the_policy() -> None:
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_hybrid_is_never_worse_than_its_policy(gappo: Allocator, seed: int) -> None:
-    """Where travel takes long, `gappo-ls` begins with the first plan of `gappo`, and soon has a far better one."""
+    """With long travel times `gappo-ls` starts from the first plan of `gappo`, and soon has a far better one."""
     instance = long_travel(seed)
     first = solve(instance, gappo, iterations=0, time_limit_s=None, threads=1).makespan
     hybrid = solve(instance, "gappo-ls", iterations=30, time_limit_s=None, threads=1)
@@ -127,7 +127,7 @@ def test_hybrid_is_never_worse_than_its_policy(gappo: Allocator, seed: int) -> N
 
 
 def test_too_large_instances_are_refused_beforehand(gappo: Allocator) -> None:
-    """Where a single game would not end in time, it says so and names its limit."""
+    """If a single game would not end in time, the method refuses and names its limit."""
     huge = Instance(ability=np.ones(10_000), workload=np.ones(1_000))
     assert gappo.refusal(huge, Objective.MAKESPAN, Budget(time_limit_s=1.0)) is not None
     with pytest.raises(RefusedError, match="may take 7 s"):
@@ -135,7 +135,7 @@ def test_too_large_instances_are_refused_beforehand(gappo: Allocator) -> None:
 
 
 def test_own_policy_is_used_only_by_its_method(tmp_path: Path) -> None:
-    """A policy file that somebody trained is played by the method that trained it, and by no other."""
+    """A user's policy file is accepted by the method that trained it, and by no other."""
     torch.manual_seed(0)
     save_policy(tmp_path / "own.safetensors", [ActorCritic(NetworkSize(8, 8, 2))], "ppo")
     instance = paper_like(12, 4, 50, 0)
@@ -146,13 +146,13 @@ def test_own_policy_is_used_only_by_its_method(tmp_path: Path) -> None:
 
 
 def test_missing_policy_file_is_refused_beforehand() -> None:
-    """A policy file that is not there is told before anything runs."""
+    """A missing policy file is reported before anything runs."""
     with pytest.raises(InputError, match="no such policy file"):
         load("gappo", policy="/nonexistent/policy.safetensors")
 
 
 def test_invalid_policy_file_is_refused_before_torch_is_loaded() -> None:
-    """Whoever mistypes a file does not wait for torch, which takes seconds."""
+    """A wrong file name is reported without loading torch, which takes seconds."""
     code = (
         "import sys\nfrom alloc.allocators import load\nfrom alloc.problems import InputError\n"
         "for policy in sys.argv[1:]:\n    try:\n        load('gappo', policy=policy)\n"
@@ -165,13 +165,13 @@ def test_invalid_policy_file_is_refused_before_torch_is_loaded() -> None:
 
 @pytest.mark.parametrize("device", ["nonsense", "cuda:99", "xpu:7", "meta", "mps", "tpu", "hpu", ""])
 def test_unavailable_devices_are_refused(device: str) -> None:
-    """A device that cannot be used is told in one plain line, whatever torch says of it."""
+    """A device that cannot be used is reported in one line, whatever torch says."""
     with pytest.raises(InputError, match=f"^device: {device!r} cannot be used here; use cpu( or cuda)?$"):
         load("gappo", device=device)
 
 
 def test_degenerate_instances_are_solved(gappo: Allocator) -> None:
-    """One agent and one task, nothing to do, nobody able: no method may stumble over them."""
+    """One agent and one task, no work, no able agent: every method copes."""
     assert solve(Instance(ability=[2], workload=[3]), gappo, time_limit_s=0.3).makespan == 1.5
     assert solve(Instance(ability=[1, 1], workload=[0, 0]), gappo, time_limit_s=0.3).makespan == 0
     nobody = Instance(ability=[1], workload=[1], allowed_tasks=[[]])

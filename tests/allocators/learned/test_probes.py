@@ -25,7 +25,7 @@ def known_answer(name: str) -> torch.Tensor:
 
 @pytest.mark.parametrize("name", PROBES)
 def test_enumerated_optima_match_known_answers(name: str) -> None:
-    """The optimum found by enumeration is the one known by reasoning."""
+    """The optimum found by enumeration equals the one known by reasoning."""
     board = probe(name).board
     slot = known_answer(name)
     state = State(**{**vars(reset(board)), "slot": slot, "group": group_ability(board, slot)})
@@ -34,7 +34,7 @@ def test_enumerated_optima_match_known_answers(name: str) -> None:
 
 @pytest.mark.parametrize("name", PROBES)
 def test_untrained_network_does_not_solve_probes(name: str) -> None:
-    """An untrained network does not solve all games, nor does the initial allocation."""
+    """Neither an untrained network nor the initial allocation solves all games."""
     board = probe(name).board
     assert share_solved(Ppo(), board) < 1
     assert (utility(board, reset(board)) < best_utility(board) - 1e-3).any()
@@ -43,5 +43,5 @@ def test_untrained_network_does_not_solve_probes(name: str) -> None:
 @pytest.mark.parametrize("method", PARAMETERS)
 @pytest.mark.parametrize("name", [pytest.param(one, marks=[pytest.mark.slow] * (one == "pairing")) for one in PROBES])
 def test_ppo_solves_probes(name: str, method: str) -> None:
-    """Games with known answers are solved, all of them."""
+    """All games with known answers are solved."""
     assert share_learned(Ppo(parameters=PARAMETERS[method]), name) == 1.0

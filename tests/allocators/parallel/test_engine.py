@@ -56,7 +56,7 @@ def engine(request: pytest.FixtureRequest, pair: ProcessEngine) -> Iterator[Engi
 
 
 def test_engines_return_the_results_of_a_loop_in_order(engine: Engine) -> None:
-    """Every engine returns what a loop returns, to the last bit."""
+    """Every engine returns the same as a loop, bit for bit."""
     assert engine.map(jobs.square, range(7)) == [0, 1, 4, 9, 16, 25, 36]
     assert engine.map(jobs.square, []) == []
     expected = [jobs.step(state) for state in states(4)]
@@ -68,7 +68,7 @@ def test_engines_return_the_results_of_a_loop_in_order(engine: Engine) -> None:
 
 
 def test_workers_are_reused_until_closed() -> None:
-    """One item needs one process of ten, the next finds it there, and a close, or two, leaves none."""
+    """One item starts one of ten processes, the next reuses it, and closing, even twice, ends it."""
     with ProcessEngine(10) as engine:
         first, second = engine.map(jobs.pid, [0]), engine.map(jobs.pid, [0])
     engine.close()
@@ -78,14 +78,14 @@ def test_workers_are_reused_until_closed() -> None:
 
 
 def test_workers_import_only_what_their_items_need() -> None:
-    """Torch, which takes seconds, is not loaded in a worker whose items do not use it."""
+    """Torch, which takes seconds to load, is not loaded in a worker whose items do not use it."""
     with ProcessEngine(1) as engine:
         assert engine.map(eval, ["'torch' in __import__('sys').modules"]) == [False]
 
 
 @pytest.mark.slow
 def test_items_of_killed_workers_are_repeated(tmp_path: Path, pair: ProcessEngine) -> None:
-    """Items whose process is killed at the first try are done at the second, the others go on undisturbed."""
+    """Items whose process is killed at the first attempt succeed at the second, and others are not affected."""
     items = [(number, str(tmp_path / str(number))) for number in range(4)]
     results = pair.map(jobs.die_first, items)
     assert results is not None
@@ -94,7 +94,7 @@ def test_items_of_killed_workers_are_repeated(tmp_path: Path, pair: ProcessEngin
 
 
 def test_item_that_always_kills_its_worker_is_an_error(tmp_path: Path) -> None:
-    """After the last try there is one error; what is killed while idle costs no try; the engine goes on."""
+    """After the last attempt there is one error; being killed while idle does not count; the engine stays usable."""
     with ProcessEngine(1, max_attempts=2) as engine:
         with pytest.raises(EngineError, match=r"died 2 times .* \(exit code -9\)"):
             engine.map(jobs.die, [str(tmp_path / "tries")])
@@ -109,7 +109,7 @@ def test_item_that_always_kills_its_worker_is_an_error(tmp_path: Path) -> None:
 
 
 def test_exceptions_of_the_function_are_raised_in_the_caller(engine: Engine) -> None:
-    """They keep their type, and tell where in the worker they arose."""
+    """They keep their type, and include the traceback of the worker."""
     with pytest.raises(KeyError, match="item 5") as caught:
         engine.map(jobs.fail, [5])
     if isinstance(engine, ProcessEngine):
@@ -120,7 +120,7 @@ def test_exceptions_of_the_function_are_raised_in_the_caller(engine: Engine) -> 
 
 @pytest.mark.slow
 def test_stop_request_drops_items_in_progress(tmp_path: Path, pair: ProcessEngine) -> None:
-    """`map` returns None at once, its workers are gone, and the engine can be used again."""
+    """`map` returns None at once, its workers end, and the engine can be used again."""
     markers = [tmp_path / name for name in ("a", "b")]
     assert pair.map(jobs.sleep_long, [str(marker) for marker in markers], when_written(*markers)) is None
     assert all(gone(int(marker.read_text())) for marker in markers)
@@ -128,7 +128,7 @@ def test_stop_request_drops_items_in_progress(tmp_path: Path, pair: ProcessEngin
 
 
 def test_serial_engine_stops_between_items() -> None:
-    """It is asked before every item."""
+    """It checks for a stop request before every item."""
     answers = iter([False, False, True])
     assert SerialEngine().map(jobs.square, range(9), lambda: next(answers)) is None
 
@@ -147,7 +147,7 @@ if __name__ == "__main__":
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL], ids=lambda number: number.name)
 def test_no_orphaned_workers(number: signal.Signals, tmp_path: Path) -> None:
-    """Ctrl-C of a whole process group, SIGTERM and even SIGKILL of the parent end the workers; the first two tidily."""
+    """Ctrl-C of a process group, SIGTERM and SIGKILL of the parent end the workers; the first two cleanly."""
     script, markers = tmp_path / "script.py", [tmp_path / name for name in ("a", "b")]
     script.write_text(SCRIPT)
     path = [str(Path(jobs.__file__).parent), os.environ.get("PYTHONPATH", "")]
@@ -174,7 +174,7 @@ def test_no_orphaned_workers(number: signal.Signals, tmp_path: Path) -> None:
 
 
 def test_ctrl_c_does_not_reach_starting_workers() -> None:
-    """Half a process cannot handle a signal, so it never gets one: the worker comes up and does its item."""
+    """A process that is still starting cannot handle a signal, and does not receive it."""
     results: list[list[int] | None] = []
     with ProcessEngine(1) as engine:
         thread = threading.Thread(target=lambda: results.append(engine.map(jobs.square, [3])))
@@ -189,7 +189,7 @@ def test_ctrl_c_does_not_reach_starting_workers() -> None:
 
 
 def test_make_engine_refuses_invalid_options() -> None:
-    """Each mistake is one line that names its option."""
+    """Each error is one line that names its option."""
     assert isinstance(make_engine(), SerialEngine)
     with make_engine("processes", workers=2) as engine:
         assert isinstance(engine, ProcessEngine)

@@ -42,7 +42,7 @@ def test_missing_ray_names_the_package(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.needs("ray")
 @pytest.mark.parametrize("address", ["127.0.0.1:1", "nowhere.invalid:6379", "ray://127.0.0.1:1", "1.2.3.4:99999", "x"])
 def test_address_without_a_cluster_is_reported_at_once(address: str) -> None:
-    """An address where no cluster is, is told at once, where Ray itself tries for minutes."""
+    """An address without a cluster is reported at once, where Ray itself would try for minutes."""
     began = time.monotonic()
     with pytest.raises(InputError, match=f"address: no Ray cluster at '{address}': "):
         make_engine("ray", address=address)
@@ -51,7 +51,7 @@ def test_address_without_a_cluster_is_reported_at_once(address: str) -> None:
 
 @pytest.mark.needs("ray")
 def test_errors_of_ray_on_joining_are_reported(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What Ray says against it is told, the versions in its later lines too."""
+    """Ray's reason is reported, including the versions in its later lines."""
     import ray
 
     def refuse(**_: object) -> None:
@@ -79,7 +79,7 @@ def engine(cluster: Any) -> Iterator[Engine]:
 @pytest.mark.needs("ray")
 @pytest.mark.slow
 def test_cluster_returns_the_results_of_a_loop_in_order(engine: Engine) -> None:
-    """A cluster returns what this process returns, to the last bit, and raises what it raises."""
+    """A cluster returns and raises the same as this process, bit for bit."""
     assert engine.map(jobs.square, range(5)) == [0, 1, 4, 9, 16]
     states = [{"seed": torch.tensor(seed), "weight": torch.full((40, 40), 0.1 * seed)} for seed in range(3)]
     got, expected = engine.map(jobs.step, states), SerialEngine().map(jobs.step, states)
@@ -95,7 +95,7 @@ def test_cluster_returns_the_results_of_a_loop_in_order(engine: Engine) -> None:
 @pytest.mark.needs("ray")
 @pytest.mark.slow
 def test_more_threads_than_processors_are_refused(cluster: Any, engine: Engine) -> None:
-    """What no machine can ever do is told at once, where Ray waits forever; the connection is still there."""
+    """Infeasible requirements are reported at once, where Ray would wait forever; the connection persists."""
     with pytest.raises(InputError, match=r"threads: no machine of the cluster has 2 processors; the largest has 1"):
         make_engine("ray", address=cluster.address, threads=2)
     assert engine.map(jobs.square, [3]) == [9]
@@ -104,7 +104,7 @@ def test_more_threads_than_processors_are_refused(cluster: Any, engine: Engine) 
 @pytest.mark.needs("ray")
 @pytest.mark.slow
 def test_items_of_killed_workers_are_repeated(engine: Engine, tmp_path: Path) -> None:
-    """Items whose process is killed at the first try are done at the next."""
+    """Items whose process is killed at the first attempt succeed at the next."""
     results = engine.map(jobs.die_first, [(number, str(tmp_path / str(number))) for number in range(4)])
     assert results is not None
     assert [square for square, _ in results] == [0, 1, 4, 9]
@@ -113,7 +113,7 @@ def test_items_of_killed_workers_are_repeated(engine: Engine, tmp_path: Path) ->
 @pytest.mark.needs("ray")
 @pytest.mark.slow
 def test_item_that_always_kills_its_worker_is_an_error(cluster: Any, engine: Engine, tmp_path: Path) -> None:
-    """After the last try there is one error, and an engine that finds a connection leaves it open."""
+    """After the last attempt there is one error, and an engine that reuses a connection leaves it open."""
     with make_engine("ray", address=cluster.address) as second:
         second._task = second._task.options(max_retries=1)
         with pytest.raises(EngineError, match="Ray gave an item up"):
@@ -124,7 +124,7 @@ def test_item_that_always_kills_its_worker_is_an_error(cluster: Any, engine: Eng
 @pytest.mark.needs("ray")
 @pytest.mark.slow
 def test_broken_connection_is_an_engine_error(engine: Engine, monkeypatch: pytest.MonkeyPatch) -> None:
-    """It is told as one of Ray, after which a training can be resumed, not as one of a file."""
+    """It is reported as an error of Ray, after which a training can be resumed, not as one of a file."""
 
     def reset(_: object) -> None:
         raise ConnectionResetError("Connection reset by peer")
@@ -150,7 +150,7 @@ def test_stop_request_drops_items_in_progress(engine: Engine, tmp_path: Path) ->
 @pytest.mark.needs("ray")
 @pytest.mark.slow
 def test_items_of_a_dead_machine_are_repeated(cluster: Any, engine: Engine, tmp_path: Path) -> None:
-    """One of three machines is killed with an item under work; every result arrives, and is right."""
+    """If one of three machines is killed during an item, every result still arrives and is correct."""
     add_machine(cluster)
     items = [(number, str(tmp_path)) for number in range(6)]
 
@@ -227,7 +227,7 @@ def assert_same_end(policy: Path, expected: Path) -> None:
 @pytest.mark.slow
 @pytest.mark.timeout(300)
 def test_training_survives_a_dead_machine(cluster: Any, options: list[str], undisturbed: Path, tmp_path: Path) -> None:
-    """The member that a killed machine trained is trained again on another, without any action of the user."""
+    """The member of a killed machine is trained again on another, without user action."""
     add_machine(cluster)
     before, policy = living(cluster), tmp_path / "p"
     with training(cluster, *options, "--output", str(policy)) as process:
@@ -250,7 +250,7 @@ def test_training_survives_a_dead_machine(cluster: Any, options: list[str], undi
 @pytest.mark.slow
 @pytest.mark.timeout(300)
 def test_killed_training_is_resumed(cluster: Any, options: list[str], undisturbed: Path, tmp_path: Path) -> None:
-    """After kill -9 the cluster is free for the next command, which goes on where the checkpoint stands."""
+    """After kill -9 the cluster is free for the next command, which continues from the checkpoint."""
     policy = tmp_path / "p"
     with training(cluster, *options, "--output", str(policy)) as process:
         assert process.stderr is not None

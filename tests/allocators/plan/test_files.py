@@ -34,7 +34,7 @@ def planned(instance: Instance, plan: list[int]) -> Result:
 
 
 def test_csv_has_a_row_per_agent(tmp_path: Path) -> None:
-    """The columns are the fields of a row, with nothing where nothing is known."""
+    """The columns are the fields of a row; unknown values are empty."""
     result = planned(earth(), [0, 0, -1])
     write_result(result, tmp_path / "plan.csv")
     with open(tmp_path / "plan.csv", encoding="utf-8", newline="") as file:
@@ -45,7 +45,7 @@ def test_csv_has_a_row_per_agent(tmp_path: Path) -> None:
 
 
 def test_workbook_has_three_sheets(tmp_path: Path) -> None:
-    """Summary, tasks and agents; numbers are numbers, headings have units, and a name is never a formula."""
+    """Summary, tasks and agents; numbers are numbers, headings have units, and names are never formulas."""
     write_result(planned(earth(), [0, 0, -1]), tmp_path / "plan.xlsx")
     book = load_workbook(tmp_path / "plan.xlsx")
     assert book.sheetnames == ["summary", "tasks", "agents"]
@@ -59,7 +59,7 @@ def test_workbook_has_three_sheets(tmp_path: Path) -> None:
 
 
 def test_geojson_has_points_and_moves(tmp_path: Path) -> None:
-    """Tasks, agents and moves with their figures; a move over the date line is in two parts, which meet there."""
+    """Tasks, agents and moves with their figures; moves across the date line are split there."""
     write_result(planned(earth(), [1, 1, 1]), tmp_path / "plan.geojson")
     document = json.loads((tmp_path / "plan.geojson").read_text())
     features = document["features"]
@@ -77,7 +77,7 @@ def test_geojson_has_points_and_moves(tmp_path: Path) -> None:
 
 
 def test_json_is_read_back(tmp_path: Path) -> None:
-    """The document is that of the result, with the units that the instance names."""
+    """The document is that of the result, with the units of the instance."""
     result = planned(earth(), [0, 1, 1])
     write_result(result, tmp_path / "plan.json")
     document = json.loads((tmp_path / "plan.json").read_text())
@@ -97,7 +97,7 @@ def test_json_is_read_back(tmp_path: Path) -> None:
     ],
 )
 def test_unsupported_files_are_refused(tmp_path: Path, instance: Instance, name: str, message: str) -> None:
-    """Another suffix, and a map without places, are an error that names the file; nothing is left behind."""
+    """Another suffix, and a map without positions, are errors that name the file; no file is left behind."""
     with pytest.raises(InputError) as caught:
         write_result(planned(instance, [0] * instance.n), tmp_path / name)
     assert message in str(caught.value)

@@ -39,7 +39,7 @@ def page(tmp_path: Path) -> Path:
 
 
 def test_page_is_self_contained(page: Path) -> None:
-    """There is one file without links, whose policy forbids to load anything, and names are data, never markup."""
+    """One file without links, whose policy forbids loading anything; names are data, never markup."""
     text = page.read_text(encoding="utf-8")
     assert re.findall(r"""(?:src|href)=["']?([^"'>\\s]+)""", text.replace("src=x", "")) == ["data:,"]
     assert "default-src 'none'" in text
@@ -51,7 +51,7 @@ def test_page_is_self_contained(page: Path) -> None:
 
 
 def test_page_contains_the_plan() -> None:
-    """Places lie from 0 to 1000, south below; bases have names, and figures are text under their headings."""
+    """Positions are scaled to 0 to 1000, with the south below; bases have names, and figures have headings."""
     plan = document(planned(harbour(), [0, 1, 1, -1]))
     tasks, agents, bases = (plan[name] for name in ("tasks", "agents", "bases"))
     assert [task["place"] for task in tasks] == [[250, 1000], [0, 250], [1000, 1000]]
@@ -64,7 +64,7 @@ def test_page_contains_the_plan() -> None:
 
 
 def test_equal_times_have_one_shade() -> None:
-    """Where all tasks are done together no task is drawn as late."""
+    """If all tasks finish together, none is drawn as late."""
     plan = document(planned(harbour(workload=[1, 3, 1]), [0, 1, 1, 2]))
     assert [task["late"] for task in plan["tasks"]] == [None] * 3
 
@@ -99,7 +99,7 @@ document.body.replaceChildren(JSON.stringify(out));
 
 @needs_browser
 def test_page_zooms_filters_and_shows_names(page: Path, tmp_path: Path) -> None:
-    """Two moves, two bases, three tasks; zooming moves them, filters and the search hide them, hovering names them."""
+    """Two moves, two bases, three tasks; zooming moves them, filters and search hide them, hovering names them."""
     assert run_in_browser(page, SCRIPT, tmp_path) == [2, 2, 3, 3, True, 0, 1, 1, 2, 0, 1, "task: t2", 5, 0]
 
 
@@ -127,5 +127,5 @@ WHITE, BLACK = "rgb(255, 255, 255)", "rgb(34, 34, 34)"
 def test_map_is_legible_on_phones_and_in_dark_mode(
     page: Path, tmp_path: Path, size: str, flags: list[str], colours: list[str]
 ) -> None:
-    """The map takes most of the height, fits the width, nothing is under the legend, and all text contrasts with it."""
+    """The map takes most of the height, fits the width, avoids the legend, and all text has enough contrast."""
     assert run_in_browser(page, LOOK, tmp_path, size, flags) == [True, True, True, *colours]

@@ -30,7 +30,7 @@ def planned(instance: Instance, plan: list[int]) -> Result:
 
 
 def test_row_of_an_agent_includes_its_whole_flight() -> None:
-    """It arrives after the way there; distance, energy and battery count the way back too."""
+    """It arrives after the outward flight; distance, energy and battery include the return flight."""
     row, other = agent_rows(planned(fleet(), [0, 1]))
     assert (row.agent, row.task, row.arrival, row.completion_time) == ("a1", "t1", 2.0, 4.0)
     assert (row.distance, row.energy, row.battery, row.battery_left) == (6.0, 12.0, 20.0, 8.0)
@@ -38,7 +38,7 @@ def test_row_of_an_agent_includes_its_whole_flight() -> None:
 
 
 def test_idle_and_infeasible_agents_do_not_fly() -> None:
-    """Neither flies; the second says why, and is in no group."""
+    """Neither flies; the second has the reason, and is in no group."""
     result = planned(fleet(battery=[5, 9]), [0, -1])
     barred, idle = agent_rows(result)
     assert barred.violation.startswith("energy 12 exceeds the battery 5")
@@ -49,7 +49,7 @@ def test_idle_and_infeasible_agents_do_not_fly() -> None:
 
 @pytest.mark.parametrize("seed", range(40))
 def test_rows_sum_to_the_scores(seed: int) -> None:
-    """Over all kinds of instances: distances and energies of agents, and times of tasks, are those of `evaluate`."""
+    """On instances of all kinds, distances and energies of agents and times of tasks equal those of `evaluate`."""
     instance = varied_instance(seed)
     result = planned(instance, np.random.default_rng(seed).integers(-1, instance.m, instance.n).tolist())
     rows, score = agent_rows(result), result.evaluation
@@ -64,7 +64,7 @@ def test_rows_sum_to_the_scores(seed: int) -> None:
 
 
 def test_columns_have_units_and_are_informative() -> None:
-    """Headings have the units of the instance; what is the same for all by nature has no column."""
+    """Headings have the units of the instance; columns that are constant by definition are omitted."""
     units = Units(time="h", distance="km", energy="kWh", work="m2")
     headings = [column.heading for column in agent_columns(fleet(units=units))]
     assert headings == [
@@ -77,7 +77,7 @@ def test_columns_have_units_and_are_informative() -> None:
 
 
 def test_rows_name_the_bases_of_return() -> None:
-    """The flight ends at the base that the row names; the column is there where somebody returns to a base."""
+    """The flight ends at the named base; the column exists only if some agent returns to a base."""
     instance = fleet(bases={"harbour": (3, 4)}, return_base=[0, -1])
     row, other = agent_rows(planned(instance, [0, 1]))
     assert (row.returns_to, row.distance, row.arrival) == ("harbour", 3 + 4, 2.0)
@@ -88,7 +88,7 @@ def test_rows_name_the_bases_of_return() -> None:
 
 
 def test_selected_rows_match_all_rows() -> None:
-    """Rows of chosen agents and tasks are those that they have among all."""
+    """Rows of selected agents and tasks equal those among all."""
     result = planned(fleet(), [0, 1])
     assert agent_rows(result, np.array([1])) == agent_rows(result)[1:]
     assert task_rows(result, np.array([1])) == task_rows(result)[1:]

@@ -22,7 +22,7 @@ def axes_of(instance: Instance):
 
 
 def test_sites_and_times_are_drawn(small):
-    """With positions there are a map and times; bars are as long as the tasks take, the last first."""
+    """With positions there are a map and bars as long as the tasks take, the last task first."""
     result = solve(small, "greedy", handle_signals=False)
     sites, times = plot(result).axes
     widths = [bar.get_width() for bar in times.patches]
@@ -31,14 +31,14 @@ def test_sites_and_times_are_drawn(small):
 
 
 def test_only_times_are_drawn_without_positions():
-    """An instance that knows no places has bars only."""
+    """An instance without positions has only bars."""
     (times,) = axes_of(Instance(ability=[1, 2], workload=[1, 0]))
     assert len(times.patches) == 2
     assert [text.get_text() for text in times.texts] == ["no work", "a1, a2"]
 
 
 def test_unserved_tasks_are_hatched(unservable):
-    """An unserved task has a hatched bar to the end of the axis, as it is never done, and is in the legend."""
+    """An unserved task has a hatched bar to the end of the axis, and an entry in the legend."""
     (times,) = axes_of(unservable)
     never, done = (bar.get_width() for bar in times.patches)
     assert never == times.get_xlim()[1] > done
@@ -57,14 +57,14 @@ def test_unserved_tasks_are_hatched(unservable):
     ],
 )
 def test_odd_instances_are_drawn(more):
-    """Unknown or equal places, huge worlds and names that look like mathematics do no harm."""
+    """Unknown or equal positions, huge coordinates and names with mathematical symbols are drawn."""
     figure = plot(solve(Instance(ability=[1, 2, 3], workload=[1, 2], **more), "greedy", handle_signals=False))
     figure.canvas.draw()
     assert figure.axes
 
 
 def test_many_tasks_are_drawn_as_vertical_bars_without_names():
-    """Beyond 40 tasks the bars stand, and beyond 60 nothing is named."""
+    """Bars are vertical beyond 40 tasks, and unlabelled beyond 60."""
     rng = np.random.default_rng(0)
     sites, times = axes_of(Instance(ability=np.ones(300), workload=np.ones(200), task_position=rng.random((200, 3))))
     assert len(times.patches) == 200
@@ -72,7 +72,7 @@ def test_many_tasks_are_drawn_as_vertical_bars_without_names():
 
 
 def test_flows_are_grouped_by_place_and_task():
-    """Agents with the same way are one flow; who stays, is idle or comes from nowhere is none."""
+    """Agents with the same start and task are one flow; those that stay, idle or have no position are none."""
     instance = Instance(
         ability=[1] * 5,
         workload=[1, 1],
@@ -89,13 +89,13 @@ def test_flows_are_grouped_by_place_and_task():
 
 
 def test_two_axes_of_largest_spread_are_drawn():
-    """A world that is flat along y is seen from that side."""
+    """Positions without spread along y are drawn in the other two coordinates."""
     instance = Instance(ability=[1], workload=[1, 1], task_position=[[0, 0, 0], [1, 0.1, 2]])
     assert two_axes(instance) == (0, 2)
 
 
 def test_labels_do_not_overlap_each_other_or_circles():
-    """A name goes to another side, or is left out, rather than cover anything; the largest circle chooses first."""
+    """A label is moved to another side or omitted; labels of large circles are placed first."""
     centre = np.array([[0.0, 0.0], [0.0, 12.0], [np.nan, np.nan]])
     radius, width = np.array([10.0, 4.0, 3.0]), np.array([10.0, 10.0, 10.0])
     middle = place_labels(centre, radius, width, 8.0, np.zeros((0, 2, 2)))
@@ -107,7 +107,7 @@ def test_labels_do_not_overlap_each_other_or_circles():
 
 
 def test_labels_avoid_moves():
-    """A name goes to the first side that no move crosses; where moves go all ways, to that which fewest cross."""
+    """A label is placed on the first side without a move, or on that with the fewest."""
     centre, radius, width = np.zeros((1, 2)), np.array([4.0]), np.array([10.0])
     up = [[0.0, 0.0], [0.0, 60.0]]
     (below,) = place_labels(centre, radius, width, 8.0, np.array([up]))
@@ -118,13 +118,13 @@ def test_labels_avoid_moves():
 
 
 def test_names_in_any_script_are_drawn_on_one_line():
-    """Glyphs that the font lacks and line breaks in names harm nothing: each label is one line."""
+    """Missing glyphs and line breaks in names do no harm: each label is one line."""
     (times,) = axes_of(Instance(name="two\nlines", task_ids=["日本", "a\nb"], ability=[1, 2], workload=[1, 2]))
     assert {label.get_text() for label in times.get_yticklabels()} == {"日本", "a b"}
 
 
 def test_very_large_instances_are_drawn_by_a_sample():
-    """Beyond what can be told apart on paper, dots and wedges are of some agents, and lines stand for the tasks."""
+    """For very large instances dots and wedges are of a sample of agents, and lines replace the bars."""
     instance = random_instance(Family(agents=30_000, tasks=1_200, starts="own"), 0)
     figure = plot(solve(instance, "greedy"))
     sites, times = figure.axes[:2]
@@ -135,7 +135,7 @@ def test_very_large_instances_are_drawn_by_a_sample():
 
 @pytest.mark.parametrize("suffix", ["png", "svg", "pdf"])
 def test_plot_writes_the_figure_that_it_returns(small, tmp_path, suffix):
-    """With a path the drawing is written too, and figures made by pyplot stay as they are."""
+    """With a path the figure is also written, and figures made by pyplot are not affected."""
     from matplotlib import pyplot
 
     before = pyplot.get_fignums()
@@ -147,14 +147,14 @@ def test_plot_writes_the_figure_that_it_returns(small, tmp_path, suffix):
 
 
 def test_other_suffixes_are_refused_before_drawing(small, tmp_path):
-    """Only pictures are written; the error names the file, and nothing is left behind."""
+    """Only picture formats are written; the error names the file, and no file is left behind."""
     with pytest.raises(InputError, match=r"picture\.gif: must end in \.png, \.svg or \.pdf"):
         plot(solve(small, "greedy", handle_signals=False), str(tmp_path / "picture.gif"))
     assert not (tmp_path / "picture.gif").exists()
 
 
 def test_a_front_is_drawn_as_steps_with_its_bounds(small):
-    """The public verb for fronts returns a figure with the points found and the region proven infeasible."""
+    """`plot_front` returns a figure with the points found and the region that is proven infeasible."""
     front = pareto(small, "milp", points=3, iterations=50, handle_signals=False)
     (axes,) = plot_front(front).axes
     assert axes.lines[1].get_xdata().tolist() == [result.makespan for result in front.points]
@@ -180,7 +180,7 @@ def fleet(**more):
 
 
 def test_bases_are_named_with_counts():
-    """Agents that begin together are one square, named by what their ids share; a single agent has its own name."""
+    """Agents with one start are one square with the common part of their ids; a single agent has its own name."""
     sites, _ = axes_of(fleet())
     names = {text.get_text() for text in sites.texts}
     assert {"north (3)", "west", "bridge", "dam"} <= names
@@ -193,7 +193,7 @@ def test_bases_are_named_with_counts():
 
 
 def test_unnamed_bases_list_few_agents():
-    """Where ids share nothing, a base of a small fleet has the names of its agents, in a large one a number."""
+    """If ids have no common part, a base of a small fleet lists its agents, one of a large fleet has a number."""
     sites, _ = axes_of(fleet(agent_ids=["ann", "ben", "cid", "dan"]))
     assert "ann, ben, cid" in {text.get_text() for text in sites.texts}
     many = Instance(
@@ -206,7 +206,7 @@ def test_unnamed_bases_list_few_agents():
 
 
 def test_bars_name_their_groups():
-    """Each bar says who is on the task."""
+    """Each bar names the group of its task."""
     _, times = plot(planned(fleet(), [0, 1, 1, 0])).axes
     assert {text.get_text() for text in times.texts} == {"north-1, west", "north-2, north-3"}
 
@@ -215,12 +215,12 @@ def test_bars_name_their_groups():
     ("longest", "text"), [(30, "ann, ben, cid, dora"), (15, "ann and 3 more"), (12, "4 agents"), (5, "")]
 )
 def test_group_labels_fit_their_bars(longest, text):
-    """A bar holds as many names as fit, else the number of agents, else nothing."""
+    """A bar has as many names as fit, else the number of agents, else nothing."""
     assert listed(["ann", "ben", "cid", "dora"], longest) == text
 
 
 def test_units_are_on_the_axes():
-    """Labels of units stand on axes and in the title, and there are none where the instance has none."""
+    """Unit labels are on the axes and in the title, and absent if the instance has none."""
     sites, times = axes_of(fleet(units=Units(time="min", distance="km", energy="kWh")))
     assert (sites.get_xlabel(), sites.get_ylabel()) == ("x (km)", "y (km)")
     assert times.get_xlabel() == "completion time (min)"
@@ -231,13 +231,13 @@ def test_units_are_on_the_axes():
 
 
 def test_colour_bar_is_drawn_if_times_differ():
-    """The colour bar is there if tasks are done at different times, and not where all are done together."""
+    """There is a colour bar if completion times differ, and none otherwise."""
     scales = [plot(planned(fleet(), plan)).axes[0].child_axes for plan in ([0, 1, 1, 1], [0, 1, 1, -1])]
     assert [len(found) for found in scales] == [1, 0]
 
 
 def test_geographic_maps_keep_their_shape():
-    """Near 60 degrees north a degree of latitude is drawn twice as long as one of longitude, also at the date line."""
+    """At 60 degrees north a degree of latitude is drawn twice as long as one of longitude, also at the date line."""
     instance = fleet(
         metric="geographic",
         agent_position=[[179, 60]] * 3 + [[-179, 59.5]],
@@ -252,7 +252,7 @@ def test_geographic_maps_keep_their_shape():
 
 
 def test_long_names_remain_distinct():
-    """Names that begin alike are not shortened to the same label."""
+    """Names with the same beginning are not shortened to the same label."""
     ids = [f"inspection of the southern pylon {number}" for number in (1, 2)]
     _, times = axes_of(fleet(task_ids=ids))
     labels = [label.get_text() for label in times.get_yticklabels()]
@@ -261,7 +261,7 @@ def test_long_names_remain_distinct():
 
 
 def test_runs_are_drawn_over_time(small):
-    """Each run is a line that falls to its makespan, below the best bound of all; energy has a panel if it counts."""
+    """Each run is a line down to its makespan, above the best bound of all; energy has its own panel."""
     runs = [solve(small, "ga", seed=seed, iterations=5, handle_signals=False) for seed in (0, 1)]
     (axes,) = plot_convergence(runs).axes
     assert legend(axes) == ["ga, seed 0", "ga, seed 1", "best lower bound"]
@@ -272,7 +272,7 @@ def test_runs_are_drawn_over_time(small):
 
 
 def test_runs_on_several_instances_are_refused(small):
-    """There is one axis of makespans, so that runs of other instances, or none, are an error."""
+    """As there is one axis of makespans, runs of different instances, or none, are an error."""
     other = solve(fleet(), "greedy", handle_signals=False)
     with pytest.raises(InputError, match="results: must be on one instance"):
         plot_convergence([other, solve(small, "greedy", handle_signals=False)])

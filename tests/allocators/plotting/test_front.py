@@ -16,5 +16,5 @@ from alloc.allocators.plotting.front import log_ticks
     ],
 )
 def test_axis_ticks_are_round_and_few(low: float, high: float, ticks: list[float]) -> None:
-    """A short axis has more than one or two numbers, a long one no more than there is room for."""
+    """A short axis has more than two ticks, a long one no more than fit."""
     assert log_ticks(low, high) == pytest.approx(ticks)

@@ -269,14 +269,14 @@ def difference(name: str, path: Path) -> str | None:
 @pytest.mark.skipif(matplotlib.__version_info__ < (3, 11), reason="text of matplotlib before 3.11 has another size")
 @pytest.mark.parametrize("name", DRAWN)
 def test_picture_matches_the_reference_picture(tmp_path: Path, name: str) -> None:
-    """The picture differs from the kept one by less than a wrong one does."""
+    """The picture differs from the reference picture by less than a wrong one does."""
     DRAWN[name](str(tmp_path / f"{name}.png"))
     wrong = difference(name, reduced(tmp_path / f"{name}.png"))
     assert wrong is None, wrong
 
 
 def test_every_reference_picture_is_drawn() -> None:
-    """No picture is kept that nothing is compared with."""
+    """Every reference picture is compared with a drawn one."""
     assert {path.stem for path in KEPT.glob("*.png")} == set(DRAWN)
 
 
@@ -336,7 +336,7 @@ WRONG: dict[str, tuple[str, Callable[[str], object]]] = {
 @pytest.mark.slow  # all of them test the test before
 @pytest.mark.parametrize("what", WRONG)
 def test_wrong_picture_is_detected(tmp_path: Path, what: str) -> None:
-    """A picture of another plan, bound or front is not taken for the one that is kept."""
+    """A picture of another plan, bound or front does not match the reference picture."""
     name, draw = WRONG[what]
     draw(str(tmp_path / "wrong.png"))
     assert difference(name, reduced(tmp_path / "wrong.png")) is not None

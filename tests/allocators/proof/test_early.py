@@ -26,7 +26,7 @@ def drawn(agents: int, tasks: int, seed: int = 1) -> Instance:
 
 @pytest.mark.parametrize("method", ["local-search", "ga", "lp-round"])
 def test_run_ends_with_a_proven_optimum(method: str) -> None:
-    """With minutes to go, a run on five agents ends at once, and its plan is proven best in both objectives."""
+    """With minutes left, a run on five agents ends at once, with a plan proven best in both objectives."""
     instance = drawn(5, 3)
     result = solve(instance, method, objective=BOTH, time_limit_s=300.0)
     best = brute_force(instance)
@@ -36,7 +36,7 @@ def test_run_ends_with_a_proven_optimum(method: str) -> None:
 
 
 def test_run_ends_with_a_proven_makespan() -> None:
-    """Where the simple bound on the makespan leaves a gap, too."""
+    """This also holds if the simple bound on the makespan leaves a gap."""
     instance = Instance(ability=[3.1, 2.3, 2.2], workload=[3, 3])
     result = solve(instance, "local-search", time_limit_s=300.0)
     assert result.lower_bound == pytest.approx(brute_force(instance).makespan)
@@ -48,7 +48,7 @@ def test_run_ends_with_a_proven_makespan() -> None:
 def test_runs_with_iteration_limits_keep_their_answers(
     method: str, shape: tuple[int, int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """With iterations and a seed, the plan is the one that the run finds without the proof."""
+    """With an iteration limit and a seed, the plan is the same as without the proof."""
 
     def plan() -> Allocation | None:
         return solve(drawn(*shape), method, objective=BOTH, time_limit_s=None, iterations=20).allocation
@@ -59,7 +59,7 @@ def test_runs_with_iteration_limits_keep_their_answers(
 
 
 def test_matching_optimum_is_proven_by_a_linear_programme() -> None:
-    """Its optimum is a matching, which a linear programme finds: the run ends with it among fourteen tasks."""
+    """The optimum with one agent per task is a matching, which ends the run even with fourteen tasks."""
     tasks = np.random.default_rng(0).random((14, 2))
     instance = Instance(ability=np.ones(14), workload=np.ones(14), task_position=tasks, agent_position=tasks + 0.01)
     run = Search(instance, BOTH, Budget(None))
@@ -72,7 +72,7 @@ def test_matching_optimum_is_proven_by_a_linear_programme() -> None:
 
 
 def test_optimal_warm_start_is_proven() -> None:
-    """A run that begins with the best plan ends before it does anything."""
+    """A run that starts from the best plan ends at once."""
     instance = drawn(5, 3)
     best = Search(instance, BOTH, Budget(None), start=Allocation(np.array(brute_force(instance).plan)))
     EarlyProof(best)
@@ -80,7 +80,7 @@ def test_optimal_warm_start_is_proven() -> None:
 
 
 def test_short_runs_skip_the_proof() -> None:
-    """Within a tenth of a second there is no time for bounds: the run has the simple ones alone."""
+    """Within 0.1 s there is no time for bounds beyond the simple ones."""
     result = solve(drawn(5, 3), "local-search", objective=BOTH, time_limit_s=0.05)
     assert result.stop_reason is StopReason.TIME_LIMIT
     assert result.energy_lower_bound is None

@@ -13,7 +13,7 @@ from alloc.problems import Instance
 
 @pytest.mark.parametrize("seed", range(60))
 def test_optimum_matches_brute_force(seed: int) -> None:
-    """Makespan and energy are those of the best of all plans, with lists, limits, travel times and idle tasks."""
+    """Makespan and energy equal brute force, with lists, limits, travel times and idle tasks."""
     instance = tiny_instance(seed)
     best, found = brute_force(instance), optimum(instance, EXACT)
     assert (found is None) == (best.unserved > 0)
@@ -25,7 +25,7 @@ def test_optimum_matches_brute_force(seed: int) -> None:
 
 
 def test_cheapest_plan_within_slack_is_best() -> None:
-    """With half as much time again, the cost is the least of all plans within that."""
+    """With 50 % more time, the cost is the least of all plans within that time."""
     instance = next(one for one in map(tiny_instance, range(60)) if brute_force(one).energy > 1 and one.n > 3)
     found = optimum(instance, MakespanTolerance(0.5))
     assert found is not None

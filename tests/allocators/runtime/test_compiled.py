@@ -26,7 +26,7 @@ def summed(added):
 
 
 def test_constants_and_small_integers_share_a_specialisation():
-    """A variable that is 0 at first, a constant, and integers of 32 bits: one function does for all, with their sum."""
+    """A variable, a constant and 32-bit integers share one compiled function, with the same sum."""
     added = module._compiled_once(numba.njit(add))
     total = summed(added)
     assert total(np.array([1, 2], dtype=np.int32)) == 13
@@ -35,7 +35,7 @@ def test_constants_and_small_integers_share_a_specialisation():
 
 
 def test_decorated_loops_share_specialisations():
-    """The decorator that all loops have makes them share, also where their machine code comes from the cache."""
+    """Loops with the common decorator share, also if their machine code comes from the cache."""
     added = compiled(add)
     assert "get_call_template" in vars(added)
     assert summed(added)(np.array([1, 2], dtype=np.int32)) == 13
@@ -59,13 +59,13 @@ class Fixed:
 
 @pytest.mark.parametrize("function", [Changed(), Fixed(), object()])
 def test_unknown_numba_versions_are_not_patched(function):
-    """Where the place in numba that is replaced is not as it was, a function stays what it is."""
+    """If the patched internals of numba differ, a function is left unchanged."""
     assert module._compiled_once(function) is function
     assert "get_call_template" not in getattr(function, "__dict__", {})
 
 
 def test_loops_without_sharing_give_the_same_results(monkeypatch):
-    """Without that place each caller has loops compiled for it, with the same sums."""
+    """Without the patch each caller has its own compiled loops, with the same sums."""
     monkeypatch.setattr(module, "CALL_TEMPLATE_PARAMETERS", ["of another numba"])
     added = module._compiled_once(numba.njit(add))
     total = summed(added)

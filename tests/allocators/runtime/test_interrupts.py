@@ -14,7 +14,7 @@ from alloc.allocators.runtime.interrupts import abandoned_threads, run_native, s
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_signals_set_the_event(number: signal.Signals) -> None:
-    """The first signal sets the event and nothing else; afterwards all handlers are as before."""
+    """The first signal only sets the event; afterwards all handlers are restored."""
     before, stop = signal.getsignal(number), threading.Event()
     with signals_set(stop):
         os.kill(os.getpid(), number)
@@ -38,7 +38,7 @@ def test_second_interrupt_is_not_caught() -> None:
 
 
 def test_other_threads_install_no_signal_handlers() -> None:
-    """Outside the main thread, where Python allows no handlers, nothing is set up."""
+    """Outside the main thread, where Python allows no handlers, none is installed."""
     seen = []
 
     def work() -> None:
@@ -52,7 +52,7 @@ def test_other_threads_install_no_signal_handlers() -> None:
 
 
 def test_native_work_returns_or_raises() -> None:
-    """Its result is returned, its exception raised here."""
+    """Its result is returned and its exception raised in the caller."""
     assert run_native(lambda: 7, lambda: False, lambda: None) == 7
 
     def fail() -> None:
@@ -63,7 +63,7 @@ def test_native_work_returns_or_raises() -> None:
 
 
 def test_native_work_is_halted() -> None:
-    """Once time is up the solver is requested to stop, and its result counts."""
+    """At the time limit the solver is requested to stop, and its result is used."""
     halted = threading.Event()
 
     def work() -> str:
@@ -74,7 +74,7 @@ def test_native_work_is_halted() -> None:
 
 
 def test_unresponsive_native_work_is_abandoned() -> None:
-    """A solver that does not stop delays the run by a fraction of a second only."""
+    """A solver that does not stop delays the run by only a fraction of a second."""
     release, begin = threading.Event(), time.monotonic()
     assert run_native(lambda: release.wait(10), lambda: True, lambda: None) is None
     assert time.monotonic() - begin < 2
@@ -111,6 +111,6 @@ print("over", flush=True)
 
 
 def test_process_exit_waits_for_abandoned_threads() -> None:
-    """A solver that calls back into an interpreter that has ended would crash a program that embeds us."""
+    """A solver that calls back into an interpreter that has ended would crash the embedding program."""
     ran = subprocess.run([sys.executable, "-c", PROGRAM], capture_output=True, text=True, timeout=30)
     assert (ran.returncode, ran.stdout.split("\n"), ran.stderr) == (0, ["over", "calls back", ""], "")

@@ -20,7 +20,7 @@ def programme(seed: int, rows: int, columns: int) -> tuple[np.ndarray, csr_array
 
 @pytest.mark.parametrize("seed", range(5))
 def test_solutions_match_scipy(seed):
-    """Solution, value and dual values are those that scipy's interface to the same solver gives."""
+    """Solution, value and duals equal those of scipy's interface to the same solver."""
     cost, matrix, limits = programme(seed, 12, 40)
     upper = np.full(40, 0.5)
     expected = linprog(cost, matrix, limits, bounds=np.column_stack([np.zeros(40), upper]), method="highs")
@@ -31,14 +31,14 @@ def test_solutions_match_scipy(seed):
 
 
 def test_infeasible_and_timed_out_programmes_have_no_solution():
-    """An infeasible programme, and one without time, have no answer."""
+    """An infeasible programme, and one without time, have no solution."""
     cost, matrix, limits = programme(0, 12, 40)
     assert minimise(cost, matrix, limits, should_stop=lambda: False, upper=np.zeros(40)) is None
     assert minimise(*programme(0, 100, 500), should_stop=lambda: False, seconds=0.0) is None
 
 
 def test_stop_request_ends_the_solver():
-    """A programme that is to stop has no answer, and leaves no thread behind."""
+    """A stopped programme has no solution, and leaves no thread behind."""
     before, limit = threading.active_count(), time.monotonic() + 20
     assert minimise(*programme(1, 300, 2000), should_stop=lambda: True) is None
     while threading.active_count() > before and time.monotonic() < limit:

@@ -47,7 +47,7 @@ def runs(monkeypatch: pytest.MonkeyPatch) -> list[FineTuning]:
 @pytest.mark.parametrize("method", LEARNED)
 @pytest.mark.parametrize("context", CONTEXTS)
 def test_torch_settings_of_the_caller_change_no_answer(method: str, context: str) -> None:
-    """Loaded and run within such a context, a method answers as it does without."""
+    """Loaded and run within such a context, a method gives the same answer."""
     run = partial(solve, paper_like(24, 6, 100, 0), objective="makespan-energy", time_limit_s=None, iterations=5)
     plain = run(load(method))
     with CONTEXTS[context]():
@@ -59,7 +59,7 @@ def test_torch_settings_of_the_caller_change_no_answer(method: str, context: str
 
 @pytest.mark.parametrize("context", CONTEXTS)
 def test_fine_tuning_works_with_torch_settings_of_the_caller(context: str, runs: list[FineTuning]) -> None:
-    """Gradients are had, and in full precision, though the caller wants none."""
+    """Gradients are computed in full precision even if the caller has disabled them."""
     with CONTEXTS[context]():
         result = solve(paper_like(24, 6, 100, 0), "gappo", objective="makespan-energy", time_limit_s=1.0)
     assert result.notes == ()
@@ -69,7 +69,7 @@ def test_fine_tuning_works_with_torch_settings_of_the_caller(context: str, runs:
 def test_failing_fine_tuning_keeps_the_plan(
     runs: list[FineTuning], monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    """The run goes on to its end with the policy as shipped, a note says what happened, and the log where."""
+    """The run continues with the shipped policy; a note reports the failure, and the log has the traceback."""
 
     def fail(*_: object) -> None:
         raise RuntimeError("out of luck")
@@ -83,7 +83,7 @@ def test_failing_fine_tuning_keeps_the_plan(
 
 
 def test_torch_state_is_restored_in_every_thread() -> None:
-    """Runs that overlap leave every thread with what it had, and others see nothing of it meanwhile."""
+    """Overlapping runs restore the settings of every thread, and do not affect others."""
     seen: list[int] = []
     first_in, second_in, first_out = threading.Event(), threading.Event(), threading.Event()
 
@@ -121,7 +121,7 @@ def test_torch_state_is_restored_in_every_thread() -> None:
 
 @pytest.mark.parametrize("learner", [Ppo, A2c, Dqn, Ddpg])
 def test_initial_weights_match_torch(learner: Callable[..., Ppo]) -> None:
-    """First weights are those that the layers draw after `manual_seed`, but no shared generator is drawn from."""
+    """Initial weights equal those after `manual_seed`, but no shared generator is used."""
     size = NetworkSize(8, 8, 2)
     before = torch.get_rng_state()
     made = learner(size, seed=5).policy.state_dict()
@@ -134,7 +134,7 @@ def test_initial_weights_match_torch(learner: Callable[..., Ppo]) -> None:
 
 
 def test_tensors_in_plain_torch_are_trainable_cpu_tensors() -> None:
-    """What is made in `plain_torch` can be trained and is on the CPU, whatever the caller has set."""
+    """Tensors made in `plain_torch` are trainable and on the CPU, whatever the caller has set."""
     with torch.inference_mode(), torch.device("meta"), plain_torch():
         weights = Ppo(NetworkSize(8, 8, 2), seed=3).policy.state_dict()
     assert all(not weight.is_inference() and weight.device.type == "cpu" for weight in weights.values())
@@ -142,7 +142,7 @@ def test_tensors_in_plain_torch_are_trainable_cpu_tensors() -> None:
 
 @pytest.mark.parametrize("method", LEARNED)
 def test_shared_generators_are_not_used(method: str) -> None:
-    """Whoever seeds torch draws the same numbers, loads and runs in between or not."""
+    """Random numbers of a caller that has seeded torch do not depend on loads and runs in between."""
     before = torch.get_rng_state()
     load(method)
     assert torch.equal(torch.get_rng_state(), before)

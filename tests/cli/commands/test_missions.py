@@ -16,7 +16,7 @@ def mission(alloc):
 
 
 def test_mission_is_simulated_and_replayed(alloc, mission):
-    """What is printed for a run comes again from its log, byte for byte, and is valid by its schema."""
+    """The output of a run is reproduced from its log byte for byte, and is valid by its schema."""
     ran = alloc("simulate", mission, "--policy", "greedy", "--deadline-ms", "0", "--log", "run.jsonl", "--json")
     assert ran.code == 0
     assert ran.json["status"] == "done"
@@ -39,7 +39,7 @@ def test_summaries_go_to_standard_error(alloc, mission):
 
 
 def test_several_runs_are_a_list(alloc, mission):
-    """With --runs the JSON is a list of results, one for each seed."""
+    """With --runs the JSON is a list of results, one per seed."""
     ran = alloc("simulate", mission, "--policy", "random", "--runs", "3", "--json")
     assert [result["seed"] for result in ran.json] == [0, 1, 2]
 
@@ -66,7 +66,7 @@ def test_a_signal_keeps_the_runs_that_are_complete(alloc, mission, monkeypatch, 
 
 
 def test_unwritable_log_keeps_the_result(alloc, mission, monkeypatch):
-    """A disk that is full by the end of a run leaves its result on standard output, with exit code 2."""
+    """If the disk is full at the end of a run, the result is on standard output, with exit code 2."""
 
     def fail(*_):
         raise OSError(28, "No space left on device")
@@ -91,7 +91,7 @@ def test_standard_output_that_cannot_be_written_costs_no_log(alloc, mission, mon
 
 
 def test_exit_codes_match_solve(alloc, mission):
-    """1 if not all is done, 2 with one line for what is wrong."""
+    """1 if not all tasks are done, 2 with one line for an error."""
     assert alloc("simulate", mission, "--policy", "idle").code == 1
     for arguments, told in (
         (("--policy", "gredy"), "--policy: there is no policy 'gredy' (did you mean 'greedy'?)"),
@@ -107,7 +107,7 @@ def test_exit_codes_match_solve(alloc, mission):
 
 
 def test_invalid_files_are_one_line(alloc):
-    """A mission or a log that is none is one line with file and place."""
+    """An invalid mission or log is reported in one line with file and place."""
     with open("bad.json", "w", encoding="utf-8") as file:
         file.write('{"format": "alloc-mission/1", "agents": [{"id": "a", "ability": 1}], "tasks": []}')
     ran = alloc("simulate", "bad.json", "--policy", "idle")
@@ -118,7 +118,7 @@ def test_invalid_files_are_one_line(alloc):
 
 
 def test_mission_in_place_of_a_log_is_reported(alloc, mission):
-    """A mission, whose first line alone is no JSON, is told as what it is; to draw a plan takes two files."""
+    """A multi-line mission in place of a log is recognised; drawing a plan needs two files."""
     ran = alloc("replay", mission)
     assert (ran.code, ran.out) == (2, "")
     told = "is not a log of a mission, but of the format 'alloc-mission/1'; `alloc simulate --log` writes logs"
@@ -130,7 +130,7 @@ def test_mission_in_place_of_a_log_is_reported(alloc, mission):
 
 
 def test_knowledge_is_checked_before_loops_are_compiled(alloc, mission, monkeypatch):
-    """A policy that needs full knowledge is refused at once where there is none, not after a minute of compiling."""
+    """A policy that needs full knowledge is refused at once, not after a minute of compilation."""
 
     def compiled():
         raise AssertionError
@@ -142,7 +142,7 @@ def test_knowledge_is_checked_before_loops_are_compiled(alloc, mission, monkeypa
 
 
 def test_instance_is_simulated_as_a_mission(alloc):
-    """An instance is a mission: re-planning once for all is as good as its makespan."""
+    """Re-planning once for an instance reaches its makespan."""
     assert alloc("generate", "random", "--agents", "6", "--tasks", "2", "--output", "i.json").code == 0
     ran = alloc("simulate", "i.json", "--policy", "replan", "--set", "method=greedy", "--json")
     solved = alloc("solve", "i.json", "--method", "greedy", "--json")
@@ -150,7 +150,7 @@ def test_instance_is_simulated_as_a_mission(alloc):
 
 
 def test_mission_options_are_refused_for_instances(alloc):
-    """What is for missions alone is refused elsewhere, and the other way round."""
+    """Mission options are refused for instances, and vice versa."""
     for arguments, told in (
         (("random", "--family", "waves"), "is for mission, not for random"),
         (("mission", "--load", "2"), "is for random, not for mission"),
@@ -163,7 +163,7 @@ def test_mission_options_are_refused_for_instances(alloc):
 
 
 def test_mission_is_drawn_and_animated_from_a_run_and_from_its_log(alloc, mission):
-    """Picture and page are written by the run, and by `alloc plot` from the log; only the run's page has knowledge."""
+    """The run and `alloc plot` of its log write picture and page; only the run's page has knowledge."""
     assert alloc(
         "simulate", mission, "--policy", "greedy", "--log", "x.jsonl", "--plot", "x.svg", "--animate", "x.html"
     ).code in (0, 1)
@@ -174,14 +174,14 @@ def test_mission_is_drawn_and_animated_from_a_run_and_from_its_log(alloc, missio
 
 
 def test_invalid_animation_files_are_refused_before_the_run(alloc, mission):
-    """A suffix that no animation has, and a damaged log, are one line and exit code 2."""
+    """An unsupported suffix, and a damaged log, give one line and exit code 2."""
     found = alloc("simulate", mission, "--policy", "greedy", "--animate", "x.avi")
     assert (found.code, found.err.strip()) == (2, "alloc: x.avi: must end in .gif, .mp4 or .html")
     assert alloc("plot", mission, "--output", "x.png").code == 2
 
 
 def test_policies_are_compared(alloc, mission):
-    """Each mission and policy has a row, as JSON, CSV and a table, and the policies differ from the first in pairs."""
+    """Each mission and policy has a row, as JSON, CSV and a table, with paired differences from the first policy."""
     arguments = ("compare", mission, mission, "--policies", "nearest,greedy[stay=2],replan", "--seeds", "2")
     ran = alloc(*arguments, "--json")
     rows = ran.json["rows"]
@@ -204,7 +204,7 @@ def test_policies_are_compared(alloc, mission):
 
 
 def test_policies_and_methods_cannot_be_mixed(alloc, mission, small):
-    """One line says what goes with what, whether options or files are mixed up."""
+    """One line says which options or files belong together."""
     for arguments, told in (
         ((mission, "--methods", "greedy"), "`alloc compare --policies` take missions"),
         ((mission,), "give either --methods, for instances, or --policies, for missions"),
@@ -219,7 +219,7 @@ def test_policies_and_methods_cannot_be_mixed(alloc, mission, small):
 
 
 def test_missions_and_logs_are_validated(alloc, mission, small):
-    """Missions, logs and instances are checked side by side, with the facts of each and what may be a mistake."""
+    """Missions, logs and instances are checked together, each with its summary and likely mistakes."""
     alloc("simulate", mission, "--policy", "greedy", "--log", "run.jsonl")
     document = json.loads(Path(mission).read_text())
     document |= {"knowledge": "full", "horizon": 0.1, "sensing": 1}
@@ -238,7 +238,7 @@ def test_missions_and_logs_are_validated(alloc, mission, small):
 
 
 def test_each_fault_of_a_mission_is_a_line(alloc, mission):
-    """Every fault has a line with file, place and mend, and the code is 2; so has the first false line of a log."""
+    """Every fault has a line with file, place and correction, and exit code 2; so has the first wrong line of a log."""
     document = json.loads(Path(mission).read_text())
     document["agents"][0]["ability"] = -1
     document["radio"]["period"] = 0
@@ -258,7 +258,7 @@ def test_each_fault_of_a_mission_is_a_line(alloc, mission):
 
 
 def test_cfstp_is_generated(alloc):
-    """A CFSTP takes numbers of agents and tasks, and no option of other families."""
+    """A CFSTP takes numbers of agents and tasks, and no options of other families."""
     ran = alloc("generate", "cfstp", "--agents", "2", "--tasks", "3", "--seed", "1", "--output", "-")
     assert (len(ran.json["agents"]), len(ran.json["tasks"]), ran.json["metric"]) == (2, 3, "manhattan")
     ran = alloc("generate", "cfstp", "--loss", "0.1")
@@ -267,7 +267,7 @@ def test_cfstp_is_generated(alloc):
 
 
 def test_files_of_other_projects_are_imported(alloc):
-    """The example files become missions that validate; options of records are refused for others, in one line."""
+    """The example files give valid missions; record options are refused for other formats, in one line."""
     folder = Path(__file__).parents[3] / "examples" / "records"
     for kind, name in (
         ("london", "calls.csv"),

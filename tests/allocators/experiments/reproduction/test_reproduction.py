@@ -69,12 +69,12 @@ def rows_of(job: Job) -> list[Learned]:
 
 
 def test_shipped_page_matches_the_shipped_rows() -> None:
-    """docs/reproduction.md is, byte for byte, what the rows beside it give."""
+    """docs/reproduction.md equals, byte for byte, the page generated from the rows beside it."""
     assert Folder(DOCS).text() == (DOCS / "reproduction.md").read_text("utf-8")
 
 
 def test_rows_are_read_back_without_truncated_lines(tmp_path: Path) -> None:
-    """What is appended is read again, infinite and missing figures too; a line cut short by a crash is left out."""
+    """Appended rows are read back, including infinite and missing values; a line truncated by a crash is skipped."""
     path = tmp_path / "rows.csv"
     assert read(path, Learned) == []
     begin(path, Learned)
@@ -88,7 +88,7 @@ def test_rows_are_read_back_without_truncated_lines(tmp_path: Path) -> None:
 
 
 def test_only_missing_runs_are_made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """An interrupted reproduction keeps the runs that have ended, and goes on with the others."""
+    """An interrupted reproduction keeps completed runs and makes the others."""
     stop, made = threading.Event(), []
 
     def make_run(data: Path, job: Job) -> None:
@@ -109,7 +109,7 @@ def test_only_missing_runs_are_made(tmp_path: Path, monkeypatch: pytest.MonkeyPa
 
 @pytest.mark.parametrize("lost", [1, 2, 9, 60])
 def test_truncated_run_is_repeated(tmp_path: Path, lost: int) -> None:
-    """A run cut short, within a line or at its end, is not read and is missing; what is appended then is whole."""
+    """A run truncated within a line or at its end is missing and repeated; rows appended afterwards are complete."""
     place, jobs = Folder(tmp_path), [Job(0, "gappo"), Job(1, "gappo"), Job(2, "gappo")]
     place.data.mkdir()
     path = place.data / "learning.csv"
@@ -128,7 +128,7 @@ def test_truncated_run_is_repeated(tmp_path: Path, lost: int) -> None:
 
 
 def test_partially_written_rows_are_an_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Where the system writes but a part of the rows, the run does not count as made."""
+    """If the system writes only a part of the rows, the run does not count as made."""
     write = os.write
     monkeypatch.setattr(os, "write", lambda handle, data: write(handle, data[:20]))
     with pytest.raises(OSError, match="only a part of the rows"):
@@ -136,7 +136,7 @@ def test_partially_written_rows_are_an_error(tmp_path: Path, monkeypatch: pytest
 
 
 def test_figures_and_page_are_made_from_rows(tmp_path: Path) -> None:
-    """Five figures and the page are written, though some methods have no runs; without any run there is an error."""
+    """Five figures and the page are written even if some methods have no runs; without any run there is an error."""
     place = Folder(tmp_path)
     with pytest.raises(InputError, match="holds no runs"):
         place.publish()
@@ -153,7 +153,7 @@ def test_figures_and_page_are_made_from_rows(tmp_path: Path) -> None:
 
 
 def test_effects_match_hand_calculation() -> None:
-    """Differences are paired by run; runs without the figure are left out; rises alone are fluctuation."""
+    """Differences are paired by run; runs without a value are excluded; increases alone count as fluctuation."""
     rows = [*history("gappo", 0, 2.0, 1.1, 1.0), *history("ppo", 0, 2.0, 1.0, 1.1), *history("gappo", 1, 2.0, 1.5, 1.2)]
     one = effect(rows, "gappo", "ppo", final("makespan"))
     assert one is not None
@@ -167,7 +167,7 @@ def test_effects_match_hand_calculation() -> None:
 
 
 def test_runs_without_the_figure_are_reported() -> None:
-    """Runs with an infinite makespan on one side are left out of means and differences, and said to be."""
+    """Runs with an infinite makespan on one side are excluded from means and differences, and reported."""
     rows = [row for run in range(4) for row in history("gappo", run, 1.0)]
     rows += [row for run, last in enumerate((1.2, 1.2, 1.2, math.inf)) for row in history("ppo", run, last)]
     rows += history("a2c", 0, math.inf)
@@ -189,7 +189,7 @@ def verdicts(ours: float, theirs: float, runs: int) -> list[str]:
 
 
 def test_verdicts_follow_the_rows() -> None:
-    """The first claim holds where `gappo` is ahead of all in every run, fails where it is behind, else is left open."""
+    """The first claim holds if `gappo` leads in every run, fails if it is behind, and is left open otherwise."""
     assert verdicts(1.0, 1.1, runs=12)[0] == HOLDS
     assert verdicts(1.3, 1.1, runs=12)[0].startswith(NOT)
     assert verdicts(1.0, 1.1, runs=5)[0].startswith(UNKNOWN)
@@ -214,7 +214,7 @@ DESCRIBED = (traditional, least_energy, battery, optimal, sizes)
 
 
 def test_descriptive_claims_need_eight_runs() -> None:
-    """Means and medians decide with eight runs and not with seven; a claim on every run is refuted by one run."""
+    """Means and medians decide with eight runs but not with seven; one run refutes a claim on every run."""
     assert described(1.0, 1.2, 90.0, runs=8) == [HOLDS] * 5
     assert described(1.0, 1.2, 90.0, runs=7) == [TOO_FEW] * 5
     assert described(1.2, 1.0, 50.0, runs=8) == [NOT, HOLDS, NOT, NOT, NOT]
@@ -223,14 +223,14 @@ def test_descriptive_claims_need_eight_runs() -> None:
 
 
 def test_infinite_makespans_count_for_either_method() -> None:
-    """Whoever leaves tasks unserved is behind in the median, and its energy is not compared."""
+    """A method that leaves tasks unserved has the worse median, and its energy is not compared."""
     assert described(1.0, math.inf, 90.0, runs=8)[:2] == [HOLDS, TOO_FEW]
     assert described(1.0, math.nan, 90.0, runs=8)[:2] == [HOLDS, TOO_FEW]
     assert described(math.inf, 1.0, 90.0, runs=8)[:2] == [NOT, TOO_FEW]
 
 
 def test_proven_optima_are_derived_from_the_rows() -> None:
-    """The page calls the bound the optimum where a plan of that length is known, and says for how many it is."""
+    """The page calls the bound the optimum only for instances with a plan of that makespan, and counts them."""
     learned = [*history("gappo", 0, 2.0, 1.2, scenario=1), *history("gappo", 0, 2.0, 1.2, scenario=2)]
     bounded = [replace(row, lower_bound=1.1) for row in learned]
     short = [replace(SOLVED, makespan=1.1, lower_bound=1.1)]
@@ -245,7 +245,7 @@ def test_proven_optima_are_derived_from_the_rows() -> None:
 
 
 def test_makespans_are_in_hours_over_the_proven_bound() -> None:
-    """Each game is judged against the bound of its own instance, whatever that is."""
+    """Each game is compared with the bound of its own instance."""
     instances = [paper_like(8, 3, 24, 1), paper_like(8, 3, 30, 1)]
     judged = learning._judged(instances)
     assert judged.bound.tolist() == [makespan_lower_bound(instance) for instance in instances]
@@ -264,7 +264,7 @@ def test_makespans_are_in_hours_over_the_proven_bound() -> None:
     ],
 )
 def test_population_is_compared_with_a_single_member(rivals: dict[str, float], runs: int, words: str) -> None:
-    """Being ahead of PPO, which differs in more, says nothing about the population; it is told beside the finding."""
+    """A lead over PPO, which differs in more, is not attributed to the population, but mentioned."""
     rows = []
     for run in range(runs):
         for method, makespan in {"gappo": 1.0, **rivals}.items():
@@ -280,7 +280,7 @@ def test_population_is_compared_with_a_single_member(rivals: dict[str, float], r
     [(0.1, 12, "helps"), (-0.1, 12, "better without"), (0.0, 12, "no effect shown"), (0.1, 5, "too few runs")],
 )
 def test_component_is_compared_with_the_variant_without_it(change: float, runs: int, verdict: str) -> None:
-    """Enough runs of a variant and the sign of their difference decide; variants without runs are not measured."""
+    """Enough runs of a variant and the sign of the difference decide; without runs, it is not measured."""
     rows = [row for run in range(runs) for row in history("gappo", run, 1.2)]
     rows += [row for run in range(runs) for row in history("gappo-on-policy", run, 1.2 + change * (1 + 0.1 * run))]
     lines = page(rows, [], []).splitlines()
@@ -291,7 +291,7 @@ def test_component_is_compared_with_the_variant_without_it(change: float, runs: 
 
 
 def test_ablations_lack_one_component(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Each variant learns, and differs from `gappo` in the part that it is named after and nothing else."""
+    """Each variant learns, and differs from `gappo` only in the component that it is named after."""
     monkeypatch.setattr(learning, "DECISIONS", 4)
     whole = learning._untrained(VARIANTS["gappo"], 3)
     assert isinstance(whole, GeneticPpo)
@@ -328,7 +328,7 @@ LACKS: dict[str, set[str]] = {
 
 @pytest.mark.slow
 def test_every_method_produces_its_rows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A short run of each method, learned and not, is judged at each point; a training is repeated to the same rows."""
+    """A short run of each method is evaluated at each point; a training is repeated to the same rows."""
     small = learning._judged([paper_like(8, 3, 24, 1)])
     monkeypatch.setattr(learning, "DECISIONS", 10)
     monkeypatch.setattr(learning, "_judged_by", lambda run: {TESTS: small, 4: small})

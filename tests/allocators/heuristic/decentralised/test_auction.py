@@ -15,7 +15,7 @@ def series(instance: Instance, objective: Objective = Objective.MAKESPAN_ENERGY)
 
 
 def test_single_agent_tasks_reach_the_bound_of_bertsekas() -> None:
-    """Where each task needs one of several equal agents, the distance exceeds the least by at most the increments."""
+    """If each task needs one of several equal agents, the distance exceeds the least by at most the increments."""
     for seed in range(20):
         rng = np.random.default_rng(seed)
         m = int(rng.integers(2, 8))
@@ -35,7 +35,7 @@ def test_single_agent_tasks_reach_the_bound_of_bertsekas() -> None:
 
 
 def test_reported_deadlines_are_met() -> None:
-    """When an auction meets all demands, tasks are done by the deadline, and none has an agent that it can spare."""
+    """If an auction meets all demands, tasks are done by the deadline, and no group has a superfluous agent."""
     for seed in range(1000, 1003):
         instance = paper(1, seed)
         auction = series(instance)
@@ -48,14 +48,14 @@ def test_reported_deadlines_are_met() -> None:
 
 
 def test_auction_ends_at_impossible_deadlines() -> None:
-    """An auction for a deadline that cannot be met ends, and says so."""
+    """An auction for an infeasible deadline ends and reports failure."""
     assert not series(Instance(ability=[1, 1], workload=[4, 4])).meet(1.0)
     assert not series(Instance(ability=[1, 1], workload=[4, 4], allowed_tasks=[[0], [0]])).meet(4.0)
 
 
 @pytest.mark.slow
 def test_paper_scenario_is_solved() -> None:
-    """The paper's first scenario comes to within 2 %, with less energy where that counts, and messages counted."""
+    """The first scenario is solved to within 2 %, with less energy if that counts; messages are counted."""
     plain = solve(paper(1, 1000), "auction", iterations=20_000, time_limit_s=None)
     saving = solve(paper(1, 1000), "auction", objective="makespan-energy", iterations=20_000, time_limit_s=None)
     assert plain.makespan <= 1.02
@@ -66,7 +66,7 @@ def test_paper_scenario_is_solved() -> None:
 
 
 def test_slack_saves_energy() -> None:
-    """With 5 % more time, the energy is far less."""
+    """With 5 % more time, the energy is far lower."""
     instance = paper(1, 1000)
     settings = {"objective": "makespan-energy", "iterations": 20_000, "time_limit_s": None}
     strict = solve(instance, "auction", **settings)

@@ -14,7 +14,7 @@ def neighbours(graph, agent: int) -> list[int]:
 
 
 def test_a_line_of_agents() -> None:
-    """Neighbours are within both ranges; an agent near no other is a component of its own."""
+    """Neighbours are within both ranges; an isolated agent is a component of its own."""
     instance = Instance(
         ability=np.ones(4),
         workload=[1],
@@ -30,7 +30,7 @@ def test_a_line_of_agents() -> None:
 
 
 def test_graph_is_complete_without_ranges_or_locations() -> None:
-    """Without ranges, or without locations, the graph is complete; one agent without a location connects all others."""
+    """Without ranges or locations the graph is complete; an agent without a location connects all others."""
     far = [[0, 0], [9, 9], [99, 99]]
     assert communication_graph(Instance(ability=[1, 1, 1], workload=[1], agent_position=far)).is_complete
     assert communication_graph(Instance(ability=[1, 1, 1], workload=[1], communication_range=[1, 1, 1])).is_complete
@@ -44,7 +44,7 @@ def test_graph_is_complete_without_ranges_or_locations() -> None:
 
 @given(instances(most_agents=6))
 def test_graph_matches_the_definition(instance: Instance) -> None:
-    """The graph is that of all pairs compared one by one, and components never cut an edge."""
+    """The graph equals the one from comparing all pairs, and no edge joins two components."""
     graph = communication_graph(instance)
     position, reach = instance.start_position, instance.communication_range
     for i in range(instance.n):

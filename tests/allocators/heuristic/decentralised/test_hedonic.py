@@ -37,7 +37,7 @@ def shortfall(instance: Instance, task_of_agent: np.ndarray) -> float:
 
 @given(instances(speeds=False))
 def test_final_partition_is_nash_and_exchange_stable(instance: Instance) -> None:
-    """At the end of a game no move of an agent, and no swap of two neighbours, reduces the shortfall."""
+    """At the end of a game, no move of an agent and no swap of two neighbours reduces the shortfall."""
     assume((instance.workload > 0).any())
     graph = communication_graph(instance)
     assume(graph.n_components == 1)
@@ -74,7 +74,7 @@ def test_agents_of_a_component_agree_on_the_partition(instance: Instance) -> Non
 
 
 def test_one_game_comes_close_to_the_optimum() -> None:
-    """On the paper's first scenario a single game comes within 3 % of the optimum, also on local communication."""
+    """On the first scenario a single game is within 3 % of the optimum, also with local communication."""
     for seed in range(1000, 1004):
         instance = paper(1, seed)
         assert evaluate(instance, stable_game(instance).allocation).makespan <= 1.03
@@ -83,7 +83,7 @@ def test_one_game_comes_close_to_the_optimum() -> None:
 
 
 def test_second_game_saves_energy() -> None:
-    """Where energy counts, a game ends with less energy than without, at no larger makespan than its first part."""
+    """If energy counts, a game ends with less energy, at no larger makespan than its first part."""
     instance = paper(1, 1000)
     saving = solve(instance, "hedonic", objective="makespan-energy", iterations=300, time_limit_s=None)
     plain = solve(instance, "hedonic", iterations=300, time_limit_s=None)
@@ -92,7 +92,7 @@ def test_second_game_saves_energy() -> None:
 
 
 def test_messages_are_counted() -> None:
-    """Two neighbours: in each round, each agent with news sends one message."""
+    """In each round, each of two neighbours with news sends one message."""
     result = solve(Instance(ability=[2, 1], workload=[2, 1]), "hedonic")
     said = re.fullmatch(r"the first game took (\d+) rounds and (\d+) messages", result.notes[0])
     assert said is not None
@@ -106,7 +106,7 @@ def test_messages_are_counted() -> None:
 
 
 def test_components_share_all_tasks() -> None:
-    """Two components both give every task its share of their ability, so that all are served."""
+    """Each of two components gives every task its share of the component's ability, so that all are served."""
     instance = Instance(
         ability=np.ones(40),
         workload=[2, 1, 1],
@@ -118,7 +118,7 @@ def test_components_share_all_tasks() -> None:
 
 
 def test_too_many_agents_are_refused() -> None:
-    """A plan of all for each agent takes n squared memory: too much for ten thousand."""
+    """A plan of all agents for each agent takes n squared memory: too much for ten thousand agents."""
     with pytest.raises(RefusedError, match="plan of all"):
         solve(Instance(ability=np.ones(10_000), workload=[1, 1]), "hedonic")
 
@@ -131,7 +131,7 @@ def test_agents_starting_on_tasks_without_work_are_reassigned() -> None:
 
 
 def test_parameters_are_set_by_keyword() -> None:
-    """Parameters are set by keyword, an unlimited radius included; wrong ones are named."""
+    """Parameters are set by keyword, including an unlimited radius; wrong ones are named."""
     assert Hedonic(communication_radius=np.inf, partners=3).parameters == HedonicParameters(np.inf, partners=3)
     for name, value in (("communication_radius", -1), ("partners", 1.5), ("hearing", 1)):
         with pytest.raises(InputError) as caught:

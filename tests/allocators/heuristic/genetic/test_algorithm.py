@@ -32,7 +32,7 @@ def hard(n: int = 30, m: int = 10, seed: int = 0) -> Instance:
 
 @pytest.mark.parametrize(("scenario", "seed"), [(1, 0), (1, 1), (4, 0)])
 def test_finds_perfect_partitions_of_the_paper(scenario: int, seed: int) -> None:
-    """On the paper's instances it reaches T = 1, and stops because that is the lower bound."""
+    """On the paper's instances it reaches T = 1, and stops as this is the lower bound."""
     result = solve(paper(scenario, seed), "ga", time_limit_s=30)
     assert result.makespan == pytest.approx(1.0, rel=1e-9)
     assert result.stop_reason is StopReason.PROVEN
@@ -45,7 +45,7 @@ def evolved() -> Result:
 
 
 def test_improves_on_greedy(evolved: Result) -> None:
-    """A few hundred generations close most of the gap that list scheduling leaves on a hard instance."""
+    """A few hundred generations close most of the gap of list scheduling on a hard instance."""
     greedy, ga = solve(hard(), "greedy"), evolved
     assert ga.makespan is not None
     assert greedy.gap is not None
@@ -55,7 +55,7 @@ def test_improves_on_greedy(evolved: Result) -> None:
 
 @pytest.mark.parametrize("objective", ["makespan", "makespan-energy"])
 def test_never_submits_infeasible_plans(objective: str) -> None:
-    """Everything that it submits respects lists of tasks."""
+    """All submitted plans respect task lists."""
     told: list[Improvement] = []
     solve(hard(), "ga", objective=objective, time_limit_s=None, iterations=60, on_improvement=told.append)
     assert len(told) > 2
@@ -64,7 +64,7 @@ def test_never_submits_infeasible_plans(objective: str) -> None:
 
 @pytest.mark.slow
 def test_saves_energy_at_equal_makespan() -> None:
-    """With energy in the objective it keeps T = 1 with far less energy than without."""
+    """With energy in the objective it keeps T = 1 with far less energy."""
     instance = paper(1, 3)
     fast = solve(instance, "ga", time_limit_s=None, iterations=300)
     saving = solve(instance, "ga", objective="makespan-energy", time_limit_s=None, iterations=300)
@@ -79,14 +79,14 @@ def outcome(result: Result) -> tuple[object, ...]:
 
 
 def test_same_seed_gives_same_answer() -> None:
-    """With an iteration budget a seed fixes the answer and the steps towards it; another seed takes other steps."""
+    """With an iteration budget a seed determines the answer and its trace; another seed has another trace."""
     answers = [solve(hard(), "ga", time_limit_s=None, iterations=40, seed=seed) for seed in (1, 1, 2)]
     assert outcome(answers[0]) == outcome(answers[1])
     assert outcome(answers[0]) != outcome(answers[2])
 
 
 def test_global_generators_are_not_used() -> None:
-    """Neither of the two global generators is drawn from or seeded."""
+    """Neither of the two global generators is used or seeded."""
     before, numpy_before = random.getstate(), np.random.get_state()  # noqa: NPY002
     solve(hard(), "ga", time_limit_s=None, iterations=5)
     assert random.getstate() == before
@@ -94,7 +94,7 @@ def test_global_generators_are_not_used() -> None:
 
 
 def test_threads_can_share_an_allocator() -> None:
-    """Runs in several threads on one object give what each gives alone."""
+    """Concurrent runs on one object give the same results as single ones."""
     allocator, alone = (
         load("ga"),
         [outcome(solve(hard(seed=s), "ga", time_limit_s=None, iterations=20)) for s in (0, 1)],
@@ -113,7 +113,7 @@ def test_threads_can_share_an_allocator() -> None:
 
 
 def test_warm_start_is_never_lost(evolved: Result) -> None:
-    """The answer is never worse than the warm start, which is better than what one generation finds by itself."""
+    """The answer is never worse than the warm start, which is better than one generation from scratch."""
     good = evolved
     assert good.allocation is not None
     cold = solve(hard(), "ga", time_limit_s=None, iterations=1, seed=5)
@@ -125,19 +125,19 @@ def test_warm_start_is_never_lost(evolved: Result) -> None:
 
 @pytest.mark.parametrize("iterations", [0, 1])
 def test_smallest_budget_gives_a_plan(iterations: int) -> None:
-    """Even without a generation there is an allocation that serves every task."""
+    """Even without a generation, every task is served."""
     assert solve(hard(), "ga", time_limit_s=None, iterations=iterations).makespan is not None
 
 
 def test_no_workload() -> None:
-    """Without any workload all agents are idle, at makespan 0."""
+    """Without workload all agents are idle, and the makespan is 0."""
     result = solve(Instance(ability=[1, 2], workload=[0, 0, 0]), "ga")
     assert result.allocation == Allocation([-1, -1])
     assert result.makespan == 0
 
 
 def test_too_few_agents() -> None:
-    """Where not all tasks can be served, it serves as many as possible and makes those fast."""
+    """If not all tasks can be served, as many as possible are served, with a small makespan."""
     instance = Instance(ability=[5, 1, 3], workload=[10, 20, 6, 0, 7], allowed_tasks=[[0, 1], [0, 1, 3], [0, 1]])
     result = solve(instance, "ga", time_limit_s=None, iterations=30)
     assert result.evaluation is not None
@@ -154,7 +154,7 @@ def test_too_few_agents() -> None:
 
 @pytest.mark.parametrize("ratio", [1e-50, 1e50])
 def test_extreme_units(ratio: float) -> None:
-    """Units as small or large as may be change nothing but the figures."""
+    """Extreme units change only the magnitude of the figures."""
     plain = solve(Instance(ability=[3, 2, 2, 1], workload=[5, 3]), "ga", time_limit_s=None, iterations=20)
     scaled = solve(
         Instance(ability=[3, 2, 2, 1], workload=[5 * ratio, 3 * ratio]), "ga", time_limit_s=None, iterations=20
@@ -164,7 +164,7 @@ def test_extreme_units(ratio: float) -> None:
 
 
 def test_time_limit_is_respected_with_many_agents() -> None:
-    """Ten thousand agents with ranges, and half a second: the budget holds to 10 % + 0.5 s of processor time."""
+    """With ten thousand agents with ranges, a limit of 0.5 s is exceeded by at most 10 % + 0.5 s of processor time."""
     rng = np.random.default_rng(0)
     instance = Instance(
         ability=rng.uniform(1, 10, 10_000),
@@ -180,7 +180,7 @@ def test_time_limit_is_respected_with_many_agents() -> None:
 
 
 def test_all_agents_idle_if_no_task_can_be_served():
-    """Where no task that takes time is within reach, all agents are idle, at once and without warnings."""
+    """If no task with workload is within reach, all agents are idle, at once and without warnings."""
     instance = Instance(
         ability=[1, 2], workload=[3, 4], agent_position=[[0, 0], [1, 1]], task_position=[[9, 9], [8, 8]],
         communication_range=[1, 1],
@@ -191,7 +191,7 @@ def test_all_agents_idle_if_no_task_can_be_served():
 
 
 def test_parameters_are_set_by_keyword() -> None:
-    """A larger population takes other steps from the same seed; wrong parameters are named."""
+    """A larger population takes other steps with the same seed; wrong parameters are named."""
     large = GeneticAlgorithm(population=200)
     assert large.parameters == GeneticParameters(population=200)
     usual, other = (solve(hard(), one, time_limit_s=None, iterations=20) for one in (GeneticAlgorithm(), large))
@@ -203,7 +203,7 @@ def test_parameters_are_set_by_keyword() -> None:
 
 
 def test_islands_are_reproducible() -> None:
-    """Counted in generations, which all islands share, populations in three threads give the same answer again."""
+    """With a budget of generations shared by the islands, three threads are reproducible."""
     settings = {"objective": "makespan-energy", "iterations": 70, "time_limit_s": None, "threads": 3}
     first, again = (solve(hard(), GeneticAlgorithm(population=16), **settings) for _ in range(2))
     assert first.allocation == again.allocation
@@ -211,7 +211,7 @@ def test_islands_are_reproducible() -> None:
 
 
 def test_islands_exchange_their_best_plans() -> None:
-    """What one island finds, the populations of all have after the next exchange, and no more generations are made."""
+    """The best plan of one island reaches all others at the next exchange; generations are counted in total."""
     instance = hard()
     search = Search(instance, Objective.MAKESPAN, Budget(None, 3 * GENERATIONS), threads=3)
     search.submit(serve_all(instance, greedy(instance)))

@@ -36,7 +36,7 @@ def some_genes(encoding: Encoding, rows: int, rng: np.random.Generator) -> np.nd
 
 
 def test_objectives_agree_with_the_evaluator(instance: Instance, rng: np.random.Generator) -> None:
-    """The objectives of a population are those that `evaluate` gives row by row."""
+    """The objectives of a population equal those of `evaluate` row by row."""
     encoding = Encoding(instance)
     genes = some_genes(encoding, 50, rng)
     objectives = encoding.objectives(genes, target_makespan=1.0)
@@ -59,7 +59,7 @@ def test_shortfall_matches_hand_calculation() -> None:
 
 
 def test_decoding_inverts_encoding(instance: Instance) -> None:
-    """Encoding keeps what is useful; agents that are not allowed, or on tasks without workload, become idle."""
+    """Encoding keeps what is useful; agents on tasks that are not allowed or without workload become idle."""
     encoding = Encoding(instance)
     allocation = Allocation([1, 2, -1, 3, 4, 5, 2, 3, 4, 5, 0, 2])
     back = encoding.decode(encoding.encode(allocation))
@@ -68,7 +68,7 @@ def test_decoding_inverts_encoding(instance: Instance) -> None:
 
 
 def test_children_inherit_whole_groups(rng: np.random.Generator) -> None:
-    """Every gene of a child is that of a parent, and some of its groups are exactly those of the second parent."""
+    """Every gene of a child is a parent's, and some groups equal those of the second parent."""
     one, other = (rng.integers(0, 5, size=(40, 20)).astype(np.int32) for _ in range(2))
     child = cross_groups(one, other, np.full(40, 0.4), rng)
     assert ((child == one) | (child == other)).all()
@@ -78,7 +78,7 @@ def test_children_inherit_whole_groups(rng: np.random.Generator) -> None:
 
 
 def test_crossover_share_of_none_and_all(rng: np.random.Generator) -> None:
-    """A child that takes no groups is its first parent; one that takes all is its second."""
+    """A child without transferred groups equals its first parent; with all of them, its second."""
     one, other = (rng.integers(0, 5, size=(9, 20)).astype(np.int32) for _ in range(2))
     assert (cross_groups(one, other, np.zeros(9), rng) == one).all()
     assert (cross_groups(one, other, np.ones(9), rng) == other).all()
@@ -89,7 +89,7 @@ def test_crossover_share_of_none_and_all(rng: np.random.Generator) -> None:
 def test_mutation_respects_reach(
     instance: Instance, rng: np.random.Generator, energy_counts: bool, pairs: float
 ) -> None:
-    """However often rows mutate, no agent is on a task that it cannot reach, and nearly every row changes."""
+    """Mutations assign no agent beyond its reach, and change nearly every row."""
     encoding = Encoding(instance)
     genes = some_genes(encoding, 30, rng)
     before = genes.copy()
@@ -111,7 +111,7 @@ def test_mutation_moves_ability_to_shortfalls(rng: np.random.Generator) -> None:
 
 
 def test_large_groups_are_sampled(rng: np.random.Generator) -> None:
-    """In groups beyond the cap every member may still move."""
+    """In groups beyond the limit every member may still move."""
     encoding = Encoding(Instance(ability=np.ones(40), workload=[20, 20]))
     touched = np.zeros(40, dtype=bool)
     for _ in range(30):
@@ -123,14 +123,14 @@ def test_large_groups_are_sampled(rng: np.random.Generator) -> None:
 
 
 def test_tournament_prefers_the_first(rng: np.random.Generator) -> None:
-    """Of 10 in order, the first wins a tournament of three with probability 1 - 0.9^3 = 0.271, the last hardly ever."""
+    """Of 10, the best wins a tournament of three with probability 1 - 0.9^3 = 0.271, the worst hardly ever."""
     winners = tournament(10, 20_000, rng)
     assert np.mean(winners == 0) == pytest.approx(0.271, abs=0.02)
     assert np.mean(winners == 9) == pytest.approx(0.001, abs=0.002)
 
 
 def test_randomised_list_schedule_without_noise_is_greedy(instance: Instance, rng: np.random.Generator) -> None:
-    """A row without noise takes agents in order of ability, each to the lowest W / h: 3, 2, 2, 1 on 5 and 3 by hand."""
+    """Without noise agents are taken by decreasing ability, each for the lowest W / h: 3, 2, 2, 1 on 5 and 3."""
     encoding = Encoding(Instance(ability=[3, 2, 2, 1], workload=[5, 3]))
     rows = list_schedules(encoding, np.zeros(1), np.zeros(1), rng, lambda: False)
     assert rows.tolist() == [[0, 1, 0, 1]]
@@ -140,7 +140,7 @@ def test_randomised_list_schedule_without_noise_is_greedy(instance: Instance, rn
 
 
 def test_energy_saving_moves_reduce_the_distance() -> None:
-    """Where energy counts, the agent drawn is nearer to the task drawn with it than to its own, and can reach it."""
+    """If energy counts, the sampled agent is nearer to the sampled task than to its own, and can reach it."""
     rng = np.random.default_rng(4)
     instance = Instance(
         ability=np.ones(30),

@@ -17,19 +17,19 @@ from alloc.problems.generate import Family, random_instance
 
 
 def test_plan_matches_hand_calculation() -> None:
-    """4 goes to the largest task, 3 to the other, 2 to the lower W/h (3/5 against 4/6), 1 evens nothing."""
+    """4 goes to the largest task, 3 to the other, 2 to the lower W/h (3/5 against 4/6), and 1 to the other again."""
     assert greedy(Instance(ability=[1, 2, 3, 4], workload=[5, 6])) == Allocation([1, 0, 0, 1])
 
 
 def test_tasks_without_workload_get_no_agent() -> None:
-    """All agents go where there is work, and none where there is no work at all."""
+    """All agents go to tasks with work, and none if there is no work at all."""
     assert greedy(Instance(ability=[1, 1], workload=[0, 3])) == Allocation([1, 1])
     assert greedy(Instance(ability=[1, 1], workload=[0, 0])) == Allocation([-1, -1])
 
 
 @given(instances(speeds=False))
 def test_heap_and_scan_agree(instance: Instance) -> None:
-    """Where all tasks are within reach, the heap gives what scanning all tasks gives."""
+    """With complete reach, the heap gives the same plan as scanning all tasks."""
     free = Instance(ability=instance.ability, workload=instance.workload)
     one_task_less = [*range(instance.m)]
     scanned = Instance(
@@ -42,7 +42,7 @@ def test_heap_and_scan_agree(instance: Instance) -> None:
 
 @given(instances())
 def test_feasible_and_complete(instance: Instance) -> None:
-    """No constraint is violated, and with the repair of `solve` the fewest tasks are unserved."""
+    """No constraint is violated, and after the repair of `solve` the fewest tasks are unserved."""
     assert not evaluate(instance, greedy(instance)).violations
     result = solve(instance, "greedy")
     assert result.evaluation is not None
@@ -68,7 +68,7 @@ def test_tree_agrees_with_the_scan(instance: Instance, factor: float) -> None:
 
 
 def test_a_hundred_thousand_agents_with_short_ranges() -> None:
-    """There is no table of all pairs, no agent beyond its range, and every task is served."""
+    """Without a table of all pairs, no agent exceeds its range, and every task is served."""
     rng = np.random.default_rng(0)
     n, m = 100_000, 2_000
     instance = Instance(
@@ -86,7 +86,7 @@ def test_a_hundred_thousand_agents_with_short_ranges() -> None:
 
 
 def test_makespan_is_at_most_four_thirds_of_the_bound() -> None:
-    """With equal workloads list scheduling covers at least 3/4 of the optimum; here against the bound itself."""
+    """With equal workloads list scheduling is within 4/3 of the optimum; here compared with the bound."""
     rng = np.random.default_rng(1)
     for _ in range(20):
         instance = Instance(ability=rng.integers(1, 10, 60), workload=np.full(5, 10.0))
@@ -96,7 +96,7 @@ def test_makespan_is_at_most_four_thirds_of_the_bound() -> None:
 
 
 def test_stops_when_time_is_up() -> None:
-    """Without time it leaves everyone idle; `solve` then serves what it can."""
+    """Without time all agents are idle; `solve` then serves what it can."""
     instance = Instance(ability=np.ones(3000), workload=[1, 1])
     late = Search(instance, Objective.MAKESPAN, Budget(0))
     assert greedy(instance, late) == Allocation.idle(instance)
@@ -104,7 +104,7 @@ def test_stops_when_time_is_up() -> None:
 
 
 def test_standalone_call_agrees_with_a_run() -> None:
-    """Called without a search, agents that need time to travel go where those of a run go."""
+    """Called without a search, agents with travel times go to the same tasks as in a run."""
     rng = np.random.default_rng(0)
     instance = Instance(
         ability=rng.uniform(1, 3, 20),
@@ -119,7 +119,7 @@ def test_standalone_call_agrees_with_a_run() -> None:
 
 
 def test_parallel_assignment_is_as_even_as_sequential() -> None:
-    """Threads that assign agents side by side leave tasks about as even as one does, and no agent out."""
+    """Threads that assign agents in parallel balance tasks about as well as one, and leave no agent out."""
     instance = random_instance(Family(agents=6000, tasks=20, communication_range=0.8), 0)
     with patch.multiple(list_schedule, LEAST_SHARED=500, MOST_SCANNED=0):
         plans = [

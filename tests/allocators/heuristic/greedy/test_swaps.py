@@ -16,7 +16,7 @@ def never() -> bool:
 
 @given(allocated(speeds=False))
 def test_swaps_keep_abilities_and_never_increase_distance(case: tuple[Instance, Allocation]) -> None:
-    """Each task keeps the abilities that it has, and the total distance does not grow."""
+    """Each task keeps the abilities assigned to it, and the total distance does not increase."""
     instance, allocation = case
     free = Instance(
         ability=instance.ability,
@@ -32,7 +32,7 @@ def test_swaps_keep_abilities_and_never_increase_distance(case: tuple[Instance, 
 
 
 def test_swaps_match_hand_calculation() -> None:
-    """On a line, equal agents take the tasks in their own order; the one of another ability stays."""
+    """On a line, equal agents take the tasks in their own order; the one with another ability stays."""
     instance = Instance(
         ability=[1, 1, 1, 2],
         workload=[1, 1, 1],
@@ -43,7 +43,7 @@ def test_swaps_match_hand_calculation() -> None:
 
 
 def test_interrupted_swaps_never_increase_distance() -> None:
-    """Out of time at once, the distance has not grown."""
+    """If interrupted at once, the distance has not increased."""
     instance = paper(1, 0)
     task = np.random.default_rng(0).integers(0, instance.m, instance.n)
     changed = reduce_distance(instance, task, lambda: True)
@@ -52,7 +52,7 @@ def test_interrupted_swaps_never_increase_distance() -> None:
 
 @pytest.mark.parametrize("scenario", [1, 4])
 def test_greedy_saves_energy_if_in_the_objective(scenario: int) -> None:
-    """The makespan is the same, the energy at least 30 % less."""
+    """The makespan is the same, the energy at least 30 % lower."""
     fast, saving = (solve(paper(scenario, 0), "greedy", objective=goal) for goal in ("makespan", "makespan-energy"))
     assert saving.makespan == pytest.approx(fast.makespan)
     assert saving.energy < 0.7 * fast.energy

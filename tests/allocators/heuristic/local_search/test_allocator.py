@@ -34,7 +34,7 @@ def test_paper_scenarios_reach_the_optimum(allocator, scenario):
 
 
 def test_energy_of_a_paper_scenario_is_near_the_optimum(allocator):
-    """Within a hundred thousand exchanges the energy comes near the least, which is 88.824 by `milp`."""
+    """After a hundred thousand exchanges the energy is near the least, 88.824 by `milp`."""
     result = solve(paper(1, 1000), allocator, objective="makespan-energy", iterations=100, time_limit_s=None)
     assert result.makespan == 1.0
     assert 88.824 * (1 - 1e-6) <= result.energy <= 88.824 * 1.08
@@ -56,7 +56,7 @@ def test_tiny_instances_match_brute_force(allocator, seed):
 @given(allocated())
 @pytest.mark.parametrize("objective", OBJECTIVES)
 def test_never_worse_than_start_or_greedy(allocator, objective, drawn):
-    """Whatever the start, the answer is no worse than it, nor than greedy, and violates no constraint."""
+    """For any start, the answer is feasible and no worse than it or than greedy."""
     instance, start = drawn
     result = solve(instance, allocator, objective=objective, start=start, iterations=3, time_limit_s=None)
     assert result.evaluation.violations == ()
@@ -65,7 +65,7 @@ def test_never_worse_than_start_or_greedy(allocator, objective, drawn):
 
 
 def test_slack_saves_energy(allocator):
-    """With a tenth more time, the plan has less energy and keeps to that time."""
+    """With 10 % more time, the plan takes less energy and meets the limit."""
     instance = paper(1, 1001)
     strict = solve(instance, allocator, objective="makespan-energy", iterations=60, time_limit_s=None)
     slack = solve(
@@ -76,7 +76,7 @@ def test_slack_saves_energy(allocator):
 
 
 def test_travel_times_and_real_abilities_beat_greedy(allocator):
-    """With speeds, and with real abilities in large groups, plans are faster than greedy's and have far less energy."""
+    """With speeds, or real abilities in large groups, plans are faster than greedy's and take far less energy."""
     settings = {"objective": "makespan-energy", "iterations": 60, "time_limit_s": None, "makespan_slack": 0.01}
     for speed in ((1.0, 3.0), None):
         instance = random_instance(Family(agents=80, tasks=5, integer=False, speed=speed, starts="own"), 1)
@@ -88,13 +88,13 @@ def test_travel_times_and_real_abilities_beat_greedy(allocator):
 
 @pytest.mark.parametrize(("seed", "least"), [(1, 77.27), (2, 57.17), (3, 63.68)])
 def test_long_travel_of_equal_agents(allocator, seed, least):
-    """Where travel takes half of the time, the makespan of equal agents is within 1 % of that of `cpsat`."""
+    """If travel takes half of the time, the makespan of equal agents is within 1 % of that of `cpsat`."""
     result = solve(long_travel(seed), allocator, iterations=60, time_limit_s=None)
     assert result.lower_bound <= result.makespan <= 1.01 * least
 
 
 def test_no_servable_work(allocator):
-    """Where no task with work can be served, or none has any, all agents are idle."""
+    """If no task with work can be served, or none has any, all agents are idle."""
     places = {"agent_position": [[0, 0], [0, 1]], "task_position": [[1, 0], [2, 0]]}
     for work, lists in (([0, 0], None), ([0, 1], [[0], [0]])):
         instance = Instance(ability=[1, 1], workload=work, allowed_tasks=lists, **places)
@@ -104,7 +104,7 @@ def test_no_servable_work(allocator):
 
 
 def test_tasks_without_work(allocator):
-    """Agents that a start sends to a task without work become idle."""
+    """Agents whose start is a task without work become idle."""
     places = {"agent_position": [[0, 0], [0, 1]], "task_position": [[0, 0], [2, 0]]}
     instance = Instance(ability=[1, 1], workload=[1, 0], **places)
     start = Allocation([0, 1])
@@ -113,7 +113,7 @@ def test_tasks_without_work(allocator):
 
 
 def test_few_agents_per_task_reach_the_bound(allocator):
-    """With four agents per task and abilities up to 1000, the bound is met within a thousandth."""
+    """With four agents per task and abilities up to 1000, the bound is met within 0.1 %."""
     rng = np.random.default_rng(4)
     instance = Instance(ability=rng.integers(1, 1001, 100), workload=np.full(25, 1000.0))
     result = solve(instance, allocator, iterations=60, time_limit_s=None)
@@ -131,7 +131,7 @@ def test_many_agents_reach_the_bound(allocator):
 @pytest.mark.parametrize("places", [{}, {"start_task": [0, 1]}, {"agent_position": [[0, 0], [3, 1]]}])
 @pytest.mark.parametrize("distances", [None, [("a1", "t2", 2.5)]])
 def test_no_compilation_within_a_run(allocator, places, distances, monkeypatch):
-    """Wherever places and distances come from, the arrays are of the types that loading has compiled the loops for."""
+    """Whatever positions and distances an instance has, arrays have the types of the compiled loops."""
     kwargs = {"ability": [1, 2], "workload": [2, 2], "task_position": [[0, 0], [1, 2]], "distances": distances}
     instance, before = Instance(**kwargs, **places), annealing.anneal.signatures
     assert len(before) == 1
@@ -153,7 +153,7 @@ def test_improve_continues_any_search():
 
 
 def test_parameters_are_set_by_keyword():
-    """Parameters are set by keyword, over those of an object, and change the answer; wrong ones are named."""
+    """Keywords override parameters of an object and change the answer; wrong ones are named."""
     instance = paper(1, 1003)
     settings = {"objective": "makespan-energy", "iterations": 20, "time_limit_s": None}
     few = LocalSearch(exchanges=100)

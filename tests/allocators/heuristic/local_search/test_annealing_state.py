@@ -15,7 +15,7 @@ from alloc.problems import IDLE, Allocation, Instance, evaluate, serve_all
 @given(allocated())
 @pytest.mark.parametrize("limit", [0, 10_000])
 def test_incremental_updates_match_recomputation(limit, drawn):
-    """After many exchanges, groups, group abilities and the distance are what they are when computed from scratch."""
+    """After many exchanges, groups, group abilities and the distance equal those computed from scratch."""
     instance, start = drawn
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(candidates, "TABLE_LIMIT", limit)
@@ -39,7 +39,7 @@ def test_incremental_updates_match_recomputation(limit, drawn):
 
 
 def test_full_groups_get_more_slots():
-    """A group that outgrows its slots is given more, and no agent is lost."""
+    """A group that outgrows its slots gets more, and no agent is lost."""
     instance = Instance(ability=np.ones(200), workload=[*[1.0] * 49, 151.0])
     state = AnnealingState(instance, 0, 5)
     state.begin(Allocation(np.arange(200) % 50), 1.0)
@@ -51,7 +51,7 @@ def test_full_groups_get_more_slots():
 
 
 def test_helpers_can_reach_the_task():
-    """The agent that is drawn to help a task can reach it, where any can."""
+    """The agent sampled to help a task can reach it, if any can."""
     instance = Instance(ability=[1.0] * 4, workload=[1.0, 1.0], allowed_tasks=[[0], [0], [1], [0, 1]])
     state = AnnealingState(instance, 0, 2)
     state.begin(Allocation([0, IDLE, 1, IDLE]), 1.0)
@@ -59,7 +59,7 @@ def test_helpers_can_reach_the_task():
 
 
 def test_helpers_come_from_nearby_tasks_without_a_table(monkeypatch):
-    """Without a table of distances, most helpers are of a task next to the short one, hardly any of one far away."""
+    """Without a table of distances, most helpers are from nearby tasks, hardly any from distant ones."""
     monkeypatch.setattr(candidates, "TABLE_LIMIT", 0)
     places = np.linspace([0.0, 0.0], [1.0, 0.0], 100)
     instance = Instance(
@@ -73,7 +73,7 @@ def test_helpers_come_from_nearby_tasks_without_a_table(monkeypatch):
 
 
 def test_prices_escape_local_minima_of_the_shortfall():
-    """A short task rises in price until it takes an agent from a task that then lacks more, but can be helped."""
+    """The price of a short task rises until it takes an agent from a task that then has a larger shortfall."""
     instance = Instance(ability=[1, 2, 1, 2], workload=[2, 3], allowed_tasks=[[0], [0, 1], [1], [1]])
     state = AnnealingState(instance, 0, 2)
     state.begin(Allocation([0, 1, 1, IDLE]), 1.0)

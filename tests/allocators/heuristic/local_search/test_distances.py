@@ -15,7 +15,7 @@ from alloc.problems import Instance
 @settings(max_examples=60, deadline=None)
 @given(instances())
 def test_distances_match_reach(instance):
-    """The loops compute what `Reach` does, to the last bit, and ``inf`` for what is out of reach."""
+    """The loops compute the same distances as `Reach`, bit for bit, and ``inf`` out of reach."""
     arrays = instance_arrays(instance)
     expected = np.where(instance.reach.mask, instance.reach.distance, np.inf)
     for row, task in product(range(len(arrays.origin_position)), range(instance.m)):
@@ -25,7 +25,7 @@ def test_distances_match_reach(instance):
 
 
 def test_extreme_coordinates_match_reach():
-    """Coordinates at the ends of the valid range have the distances that `Reach` gives them."""
+    """Coordinates at the limits of the valid range have the distances of `Reach`."""
     instance = Instance(
         ability=[1, 1], workload=[1, 1], agent_position=[[1e60, 0], [0, 3e40]], task_position=[[0, 1e60], [5, 5]]
     )

@@ -32,7 +32,7 @@ def state_of(instance: Instance, plan: list[int]) -> AnnealingState:
 
 
 def test_ejection_chain_solves_a_ring(ring: Instance) -> None:
-    """No two tasks share two agents, so that no exchange helps; one ejection chain moves all three, and is kept."""
+    """No two tasks share two agents, so that no exchange helps; one ejection chain moves all three agents."""
     state = state_of(ring, [0, 1, 2])
     weights = state.weights(1.0, 0.0, 100.0, 100.0)
     for _ in range(10):  # helpers are drawn
@@ -43,7 +43,7 @@ def test_ejection_chain_solves_a_ring(ring: Instance) -> None:
 
 
 def test_ejection_chain_without_gain_is_undone(ring: Instance) -> None:
-    """From the best plan, every ejection chain is undone: agents, abilities, cost and shortfalls are what they were."""
+    """From the best plan, every chain is undone: agents, abilities, cost and shortfalls are restored."""
     state = state_of(ring, [1, 2, 0])
     before = [array.copy() for array in (state.plan.group_of_agent, state.plan.group_ability, state.plan.cost)]
     weights = state.weights(1.0, 0.0, 100.0, 100.0)
@@ -55,7 +55,7 @@ def test_ejection_chain_without_gain_is_undone(ring: Instance) -> None:
 
 
 def test_longest_ejection_chain_can_be_undone() -> None:
-    """Every exchange of a chain may move its whole pool: undoing that restores all groups, wherever the log begins."""
+    """Every exchange of a chain may move its whole pool: undoing it restores all groups."""
     longest = 1 + (2 * LENGTH + 1) * POOL_BY_SUMS
     instance = Instance(
         ability=np.ones(300), workload=np.ones(3), task_position=LINE, agent_position=np.zeros((300, 2))
@@ -73,7 +73,7 @@ def test_longest_ejection_chain_can_be_undone() -> None:
 
 
 def test_one_strong_agent_may_be_cheaper_than_many() -> None:
-    """A small task gets the strong idle agent nearby, which has much to spare, and not weak ones from afar."""
+    """A small task gets a nearby strong agent with ability to spare instead of distant weak ones."""
     far = np.full((7, 2), 9.0)
     instance = Instance(
         ability=[10, *np.ones(7)], workload=[3], task_position=[[0, 0]], agent_position=[[0.1, 0], *far.tolist()]
@@ -85,7 +85,7 @@ def test_one_strong_agent_may_be_cheaper_than_many() -> None:
 
 @pytest.mark.parametrize("seed", range(3))
 def test_annealing_with_short_lists_finds_the_optimum(seed: int) -> None:
-    """Where each agent may do two of four tasks, the least energy is that by brute force, and the books are kept."""
+    """If each agent may do two of four tasks, the energy equals brute force, and the state stays consistent."""
     rng = np.random.default_rng(seed)
     instance = Instance(
         ability=rng.integers(1, 9, 9),

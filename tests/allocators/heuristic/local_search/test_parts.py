@@ -30,7 +30,7 @@ def parts_of(instance: Instance, threads: int) -> Parts:
 
 
 def test_every_part_has_tasks_and_their_agents(instance: Instance) -> None:
-    """Parts have about as many agents each, and agents are in the part of their task."""
+    """Parts have about equally many agents, and agents are in the part of their task."""
     parts = parts_of(instance, 3)
     part_of_task, part_of_agent = parts._divide()
     group = parts.state.plan.group_of_agent
@@ -41,7 +41,7 @@ def test_every_part_has_tasks_and_their_agents(instance: Instance) -> None:
 
 
 def test_joined_plan_is_consistent_with_its_parts(instance: Instance) -> None:
-    """After many rounds no group is wrong: cost and abilities are those computed anew, and the best can be flown."""
+    """After many rounds, groups, cost and abilities equal those computed anew, and the plan is feasible."""
     parts = parts_of(instance, 3)
     state, weights = parts.state, LocalSearchParameters().weights(parts.state, 0.01, HARD)
     before = state.cost
@@ -60,14 +60,14 @@ def test_joined_plan_is_consistent_with_its_parts(instance: Instance) -> None:
 
 
 def test_few_tasks_are_not_partitioned() -> None:
-    """With too few tasks for two parts, the whole plan is annealed as by a single thread."""
+    """With too few tasks for two parts, the whole plan is annealed by a single thread."""
     assert parts_of(random_instance(Family(agents=20, tasks=5), 0), 4).count == 1
 
 
 @pytest.mark.parametrize("objective", OBJECTIVES)
 @pytest.mark.parametrize("method", ["local-search", "lp-round"])
 def test_same_number_of_threads_gives_same_answer(instance: Instance, method: str, objective: str) -> None:
-    """Counted in iterations, a run by three threads can be repeated, and is no worse than its start."""
+    """With an iteration budget, three threads are reproducible, and no worse than the start."""
     allocator = load(method)
     settings = {"objective": objective, "iterations": 40, "time_limit_s": None, "threads": 3}
     first, again = (solve(instance, allocator, **settings) for _ in range(2))

@@ -39,7 +39,7 @@ def lose(state):
 
 
 def test_penalty_decreases_without_shortfalls_to_a_minimum(state):
-    """Periods that end without a shortfall lower it, and it stays above the limit."""
+    """Periods that end without a shortfall lower it, down to a limit."""
     factor = PenaltyFactor(state, 10**9, 1e9)
     factor.update(1)
     assert factor.value == pytest.approx(FALL)
@@ -49,7 +49,7 @@ def test_penalty_decreases_without_shortfalls_to_a_minimum(state):
 
 
 def test_search_returns_to_its_best_plan(state):
-    """After periods in a row with shortfalls, which raise the penalty, the plan is the best one again, to the agent."""
+    """After consecutive periods with shortfalls, which raise the penalty, the plan is again the best one."""
     factor, best = PenaltyFactor(state, 10**9, 1e9), state.best
     lose(state)
     for _ in range(PATIENCE):
@@ -64,7 +64,7 @@ def test_search_returns_to_its_best_plan(state):
 
 
 def test_penalty_is_constant_on_a_short_budget(state):
-    """Where the budget allows few exchanges for each agent, nothing adapts."""
+    """If the budget allows few exchanges per agent, nothing adapts."""
     factor = PenaltyFactor(state, 10**9, LEAST_EXCHANGES - 1)
     for _ in range(10):
         factor.update(1)

@@ -53,7 +53,7 @@ def test_enumeration_finds_the_cheapest_subset(seed):
 
 @pytest.mark.parametrize("seed", range(20))
 def test_dynamic_programming_finds_the_cheapest_subset(seed):
-    """Dynamic programming over all sums finds the cheapest subset where abilities are integers."""
+    """Dynamic programming over sums is exact for integer abilities."""
     size = 1 + seed % 8
     work, needs = pool_of(seed, size, integer=True)
     total = float(work.ability[:size].sum())
@@ -64,7 +64,7 @@ def test_dynamic_programming_finds_the_cheapest_subset(seed):
 
 @pytest.mark.parametrize("seed", range(20))
 def test_meet_in_the_middle_finds_the_least_shortfall(seed):
-    """Where agents cost nothing, meeting in the middle finds a subset whose shortfall is as small as any."""
+    """If agents cost nothing, meet-in-the-middle search minimises the shortfall."""
     size = 2 + seed % 8
     work, needs = pool_of(seed, size, integer=False)
     work.cost[:size] = 0.0
@@ -76,7 +76,7 @@ def test_meet_in_the_middle_finds_the_least_shortfall(seed):
 
 
 def test_no_task_is_left_unserved():
-    """A task that would lose its last agent keeps it, whatever that costs."""
+    """A task never loses its last agent, at any cost."""
     work = workspace(0)
     work.ability[0], work.other_ability[0], work.cost[0] = 1.0, 1.0, 1e6
     needs = Needs(1e-9, 0.0, 1.0, 1.0, True, False)

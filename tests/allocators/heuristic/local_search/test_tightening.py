@@ -30,7 +30,7 @@ def travelling(agents: int, tasks: int) -> Instance:
 
 @pytest.mark.parametrize("threads", [1, 2])
 def test_plan_from_prices_is_tightened(threads: int) -> None:
-    """Few exchanges close most of the gap that a plan from prices has; the count of iterations is kept to."""
+    """Few exchanges close most of the gap of a plan from prices, within the iteration limit."""
     search = Search(travelling(6_000, 60), Objective.MAKESPAN, Budget(None, 60), threads=threads)
     priced = plan_by_prices(search)
     assert priced is not None
@@ -42,7 +42,7 @@ def test_plan_from_prices_is_tightened(threads: int) -> None:
 
 
 def test_same_seed_gives_same_plan() -> None:
-    """Where iterations are counted, two runs give one answer."""
+    """With an iteration budget, two runs give the same answer."""
     instance = travelling(5_000, 50)
     first, second = (solve(instance, "local-search", time_limit_s=None, iterations=20, threads=2) for _ in range(2))
     assert first.allocation == second.allocation
@@ -53,7 +53,7 @@ def test_same_seed_gives_same_plan() -> None:
 def test_price_loops_are_compiled_before_the_clock_starts(
     monkeypatch: pytest.MonkeyPatch, agents: int, loaded: int
 ) -> None:
-    """The method loads them where it uses them, and `solve` asks it to, whatever its name is."""
+    """The method loads them if it uses them, as `solve` asks it to, whatever its name."""
     calls: list[str] = []
     monkeypatch.setattr(allocator, "compile_prices", lambda: calls.append("prices"))
 

@@ -17,7 +17,7 @@ def relaxation(instance: Instance, by_place: bool = True) -> tuple[Relaxation, S
 
 
 def test_least_makespan_matches_hand_calculation() -> None:
-    """Two thirds of the ability go to two thirds of the work; with task lists, each agent does its own."""
+    """Two thirds of the ability go to two thirds of the work; with task lists, each agent does its own task."""
     lp, search = relaxation(Instance(ability=[4, 2], workload=[4, 2]))
     assert lp.least_makespan(search) == pytest.approx(1.0)
     lp, search = relaxation(Instance(ability=[3, 3], workload=[4, 2], allowed_tasks=[[0], [1]]))
@@ -29,7 +29,7 @@ def test_least_makespan_matches_hand_calculation() -> None:
 
 @pytest.mark.parametrize("seed", seeds_where(lambda one: all_can_be_served(one) and not one.has_travel_time, 20))
 def test_relaxation_never_exceeds_the_optimum(seed: int) -> None:
-    """The least fractional makespan lies below the least of all allocations that serve every task."""
+    """The least fractional makespan is at most that of any allocation that serves every task."""
     instance = tiny_instance(seed)
     best = brute_force(instance)
     assert not best.unserved
@@ -38,7 +38,7 @@ def test_relaxation_never_exceeds_the_optimum(seed: int) -> None:
 
 
 def test_rounding_lacks_at_most_one_agent_per_task() -> None:
-    """Before any repair, no task of the first scenario lacks more than one agent of ability 10."""
+    """Before any repair, no task of the first scenario is short by more than an agent of ability 10."""
     instance = paper(1, 1000)
     lp, search = relaxation(instance)
     makespan = lp.least_makespan(search)
@@ -47,14 +47,14 @@ def test_rounding_lacks_at_most_one_agent_per_task() -> None:
 
 
 def test_energy_is_near_its_bound() -> None:
-    """Scenario 1 is solved to T = 1 at an energy not far above its bound."""
+    """Scenario 1 is solved to T = 1 with an energy slightly above its bound."""
     result = solve(paper(1, 1000), "lp-round", objective="makespan-energy", iterations=200, time_limit_s=None)
     assert result.makespan == pytest.approx(1.0)
     assert result.energy <= 1.4 * result.energy_lower_bound
 
 
 def test_large_programmes_are_refused() -> None:
-    """What a linear programme cannot solve in the time given is refused before the clock runs."""
+    """If the linear programme cannot be solved in time, it is refused before the clock starts."""
     rng = np.random.default_rng(0)
     large = Instance(
         ability=rng.random(4000) + 1,

@@ -18,7 +18,7 @@ def fractional_plan(rng: np.random.Generator):
 
 @pytest.mark.parametrize("seed", range(100))
 def test_no_task_loses_more_than_one_agent(seed: int) -> None:
-    """Each task keeps what the fractions brought but for the largest of them, and no agent is used twice."""
+    """Each task keeps the ability of its fractions except the largest one, and no agent is used twice."""
     agent_class, task, amount, share, cost, count = fractional_plan(np.random.default_rng(seed))
     integer = round_fractions(agent_class, task, amount, share, cost, count)
     assert (np.bincount(agent_class, weights=integer) <= count).all()
@@ -31,7 +31,7 @@ def test_no_task_loses_more_than_one_agent(seed: int) -> None:
 
 
 def test_integer_plans_are_unchanged() -> None:
-    """What is integer already, but for the last digits of a solver, is left alone."""
+    """Values that are integers within the solver's tolerance are kept."""
     agent_class, task = np.array([0, 0, 1]), np.array([0, 1, 1])
     amount = np.array([2 - 1e-10, 1.0, 3 + 1e-10])
     rounded = round_fractions(agent_class, task, amount, np.ones(3), np.zeros(3), np.array([3, 3]))
@@ -39,7 +39,7 @@ def test_integer_plans_are_unchanged() -> None:
 
 
 def test_cost_never_increases() -> None:
-    """Of two ways to fill two half slots, the cheaper is taken: no dearer than the fractions were."""
+    """Of two ways to fill two half slots, the cheaper is taken, at no more than the cost of the fractions."""
     agent_class, task = np.array([0, 0, 1, 1]), np.array([0, 1, 0, 1])
     cost = np.array([1.0, 9.0, 9.0, 1.0])
     rounded = round_fractions(agent_class, task, np.full(4, 0.5), np.ones(4), cost, np.array([1, 1]))

@@ -37,7 +37,7 @@ def travelling(agents: int, tasks: int, seed: int = 0, *, reach: float = 0.5) ->
 
 @pytest.mark.parametrize("seed", seeds_where(all_can_be_served, 40))
 def test_bound_never_exceeds_the_optimum(seed):
-    """On tiny instances of every sort, the bound is at most the optimum of brute force, and at least the simple one."""
+    """On tiny instances of every kind, the bound lies between the simple bound and the optimum of brute force."""
     instance = tiny_instance(seed)
     if instance.workload.any():
         bound = prices_of(instance).bound
@@ -45,7 +45,7 @@ def test_bound_never_exceeds_the_optimum(seed):
 
 
 def test_shortlists_contain_the_most_valuable_tasks():
-    """The tree finds the same tasks and values as a look at all pairs."""
+    """The tree finds the same tasks and values as checking all pairs."""
     instance = travelling(200, 60)
     prices = TaskPrices(instance, 1.0, map, 1)
     price = np.random.default_rng(1).uniform(0.5, 1.0, instance.m)
@@ -58,13 +58,13 @@ def test_shortlists_contain_the_most_valuable_tasks():
 
 
 def test_prices_raise_the_bound_with_short_shortlists():
-    """Where agents reach all of many tasks, prices raise the bound as well."""
+    """If agents reach many tasks, prices still raise the bound."""
     instance = travelling(20_000, 300, reach=np.inf)
     assert prices_of(instance).bound > 1.005 * makespan_lower_bound(instance)
 
 
 def test_prices_raise_the_bound_to_the_fractional_optimum():
-    """With travel times, bound and fractional makespan all but meet, well above the simple bound."""
+    """With travel times, bound and fractional makespan nearly meet, well above the simple bound."""
     instance = travelling(3_000, 30)
     prices = prices_of(instance)
     assert prices.bound > 1.002 * makespan_lower_bound(instance)
@@ -72,7 +72,7 @@ def test_prices_raise_the_bound_to_the_fractional_optimum():
 
 
 def test_bound_does_not_depend_on_threads():
-    """Agents in several parts have the same value."""
+    """Agents divided among threads have the same values."""
     instance = travelling(1_000, 20)
     bounds = []
     for threads in (1, 3):
@@ -83,7 +83,7 @@ def test_bound_does_not_depend_on_threads():
 
 
 def test_rounded_plan_lacks_little_of_the_work():
-    """A rounded plan sends agents where they can go, and lacks little of the work."""
+    """A rounded plan respects reach, and has small shortfalls."""
     instance = travelling(3_000, 30)
     prices = prices_of(instance)
     plan = rounded(prices)
@@ -93,7 +93,7 @@ def test_rounded_plan_lacks_little_of_the_work():
 
 
 def test_best_response_passes_reduce_shortfalls():
-    """Without passes in which agents change to where they bring most, the same plan is much slower."""
+    """Without passes in which agents move to where they contribute most, the plan is much slower."""
     instance = travelling(3_000, 30)
     prices = prices_of(instance)
     settled, calls = rounded(prices), iter([False, False])  # both passes of the assignment, and no other
@@ -104,7 +104,7 @@ def test_best_response_passes_reduce_shortfalls():
 
 @pytest.mark.parametrize("count", [10, 1_000])
 def test_sample_represents_all_ability_in_every_quarter(count):
-    """Representatives stand for all ability, and in each quarter of the square for about as much as there is."""
+    """Representatives have the total ability, and in each quarter of the square about the actual one."""
     instance = travelling(4_000, 10, seed=3)
     chosen, ability = representatives(instance, count)
     assert len(np.unique(chosen)) == count
@@ -116,7 +116,7 @@ def test_sample_represents_all_ability_in_every_quarter(count):
 
 
 def test_sample_with_few_agents_or_no_positions():
-    """No more agents are chosen than there are; without positions, any agents stand for all."""
+    """At most all agents are sampled; without positions, any agents represent the others."""
     instance = Instance(ability=np.arange(1, 101), workload=[1.0, 2.0])
     chosen, ability = representatives(instance, 1_000)
     assert chosen.tolist() == [*range(100)]
@@ -127,7 +127,7 @@ def test_sample_with_few_agents_or_no_positions():
 
 
 def test_prices_end_early_without_travel_times():
-    """Without travel times, where all reach the like of everything, a sample shows that prices prove nothing."""
+    """Without travel times and with similar reach, a sample shows that prices prove nothing."""
     instance = Instance(ability=np.ones(100), workload=np.full(10, 5.0), allowed_tasks=[[*range(10)]] * 100)
     prices = TaskPrices(instance, makespan_lower_bound(instance), map, 1)
     assert not prices.improve(np.inf, never)
@@ -135,7 +135,7 @@ def test_prices_end_early_without_travel_times():
 
 
 def test_distant_shortfall_is_priced_in_few_iterations():
-    """Where agents are at one end of a line, work at the other, and each agent reaches a part, bounds come soon."""
+    """With agents at one end of a line, work at the other, and partial reach, bounds converge quickly."""
     n, m = 8_000, 200
     rng = np.random.default_rng(0)
     along = np.linspace(0, 1, m)
@@ -156,7 +156,7 @@ def test_distant_shortfall_is_priced_in_few_iterations():
 
 
 def test_regions_are_the_nodes_of_the_tree():
-    """Each task is in all regions on its way to the root, with weights that fall with the size of the region."""
+    """Each task belongs to all regions on its path to the root, with weights that decrease with their size."""
     position = np.random.default_rng(0).random((50, 3))
     tree = build_tree(position, np.arange(10, 50))
     weight = regions_of(tree).toarray()
@@ -167,5 +167,5 @@ def test_regions_are_the_nodes_of_the_tree():
 
 
 def test_single_tasks_are_not_regions():
-    """One task has a variable of its own already."""
+    """A single task already has its own variable."""
     assert regions_of(build_tree(np.zeros((3, 3)), np.array([1]))).shape == (1, 0)

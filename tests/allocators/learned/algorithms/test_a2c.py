@@ -14,14 +14,14 @@ from alloc.problems.game import PAPER, PLANNING, Rules, TurnRule, apply_moves, r
 
 
 def test_returns_match_the_definition() -> None:
-    """Q is the discounted sum of the rewards to come and of the value of the last state."""
+    """Q is the discounted sum of future rewards and the value of the last state."""
     reward, alive = torch.tensor([[1.0], [2.0], [4.0]]), torch.ones(3, 1, dtype=torch.bool)
     got = n_step_returns(reward, alive, torch.tensor([8.0]), 0.5)
     assert got[:, 0].tolist() == [1 + 0.5 * 2 + 0.25 * 4 + 0.125 * 8, 2 + 0.5 * 4 + 0.25 * 8, 4 + 0.5 * 8]
 
 
 def test_no_return_beyond_the_end_of_a_game() -> None:
-    """The step that stops a game earns its own reward only, whatever is written behind it."""
+    """The last step of a game has only its own reward, whatever is stored after it."""
     reward = torch.tensor([[1.0], [2.0], [99.0]])
     alive = torch.tensor([[True], [True], [False]])
     assert n_step_returns(reward, alive, torch.tensor([77.0]), 0.5)[:, 0].tolist() == [2.0, 2.0, 0.0]
@@ -29,7 +29,7 @@ def test_no_return_beyond_the_end_of_a_game() -> None:
 
 @pytest.mark.parametrize("rules", [PLANNING, Rules(turn=TurnRule.SIMULTANEOUS), PAPER])
 def test_segments_continue_each_other(rules: Rules) -> None:
-    """Playing on from the state after a segment earns what one long game earns: rewards add up to the rise."""
+    """Continuing from the state after a segment gives the same rewards as one long game."""
     board = probe("pairing").board
     learner, generator = A2c(), torch.Generator().manual_seed(0)
     first = collect(learner.network, board, 1, generator, rules)
@@ -43,7 +43,7 @@ def test_segments_continue_each_other(rules: Rules) -> None:
 
 
 def test_probabilities_follow_advantages() -> None:
-    """One step raises the probability of what earned more than expected, and lowers that of what earned less."""
+    """One update raises the probability of actions with positive advantage, and lowers that of others."""
     board = probe("right_task").board
     for sign in (1.0, -1.0):
         learner = A2c(parameters=A2cParameters(ent_coef=0.0, vf_coef=0.0))
@@ -57,12 +57,12 @@ def test_probabilities_follow_advantages() -> None:
 
 
 def test_job_depends_only_on_state_and_job() -> None:
-    """Stored between jobs and restored in another learner, training continues bit for bit as without a break."""
+    """Stored between jobs and restored in another learner, training continues bit for bit."""
     assert_resumes_elsewhere(A2c)
 
 
 def test_simultaneous_turns_can_be_trained() -> None:
-    """The paper's turn rule works as well, and weights stay finite."""
+    """The paper's turn rule works, and weights stay finite."""
     learner = A2c()
     before = weights(learner)
     report = learner.train_on(TrainingJob(0, 50, curriculum=probe("pairing"), rules=Rules(turn=TurnRule.SIMULTANEOUS)))
@@ -74,5 +74,5 @@ def test_simultaneous_turns_can_be_trained() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", PROBES)
 def test_a2c_solves_probes(name: str) -> None:
-    """Games with known answers are solved, all of them."""
+    """All games with known answers are solved."""
     assert share_learned(A2c(), name) == 1.0

@@ -14,7 +14,7 @@ QUALITY = torch.tensor([[2.0, -torch.inf, 5.0, 0.0]], dtype=torch.float64)
 
 
 def test_relaxed_actions_match_hand_calculation() -> None:
-    """A softmax at a temperature, with probability 0 for closed bids; at low temperature the best bid has all of it."""
+    """A softmax with a temperature and probability 0 of closed bids; at low temperature the best bid has all of it."""
     e = torch.tensor([2.0, 1.0, 0.0], dtype=torch.float64).exp()
     assert relaxed_action(GAIN, 0.5)[0, [0, 2, 3]].tolist() == pytest.approx((e / e.sum()).tolist())
     assert relaxed_action(GAIN, 0.5)[0, 1] == 0
@@ -22,7 +22,7 @@ def test_relaxed_actions_match_hand_calculation() -> None:
 
 
 def test_value_of_relaxed_actions_is_multilinear() -> None:
-    """At a corner it is the value of that bid, between corners the mean of their values."""
+    """At a corner it is the value of that bid, between corners their weighted mean."""
     corners = torch.eye(4, dtype=torch.float64)[[0, 2, 3]]
     assert relaxed_value(corners, QUALITY.expand(3, -1)).tolist() == [2.0, 5.0, 0.0]
     assert relaxed_value(corners.mean(0, keepdim=True), QUALITY).item() == pytest.approx(7 / 3)
@@ -42,7 +42,7 @@ def test_gradient_matches_finite_differences() -> None:
 
 
 def test_entropy_matches_hand_calculation_with_a_finite_gradient() -> None:
-    """Two equal shares have log 2; the gradient is finite where a bid is closed."""
+    """Two equal shares have entropy log 2; the gradient is finite for closed bids."""
     scores = torch.tensor([[1.0, -torch.inf, 1.0]]).requires_grad_()
     entropy = entropy_of(relaxed_action(scores, 1.0))
     assert entropy.item() == pytest.approx(0.6931472)
@@ -76,13 +76,13 @@ def test_polyak_updates_match_hand_calculation() -> None:
 
 
 def test_job_depends_only_on_state_and_job() -> None:
-    """Stored with its memory between jobs and restored in another learner, training continues bit for bit."""
+    """Stored with its replay buffer and restored in another learner, training continues bit for bit."""
     assert_resumes_elsewhere(Ddpg)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", PROBES)
 def test_ddpg_solves_probes(name: str) -> None:
-    """Games with known answers are solved, all of them."""
+    """All games with known answers are solved."""
     learner = Ddpg(parameters=DdpgParameters(learning_rate=3e-3, replay_ratio=8.0, tau=0.05, ent_coef=1.0))
     assert share_learned(learner, name, decisions=60) == 1.0

@@ -14,13 +14,13 @@ from alloc.problems.game import PLANNING, State, action_mask, reset
 
 
 def test_target_matches_hand_calculation() -> None:
-    """r + gamma max Q: what follows counts unless the game is over."""
+    """r + gamma max Q, without the second term at the end of a game."""
     reward, following, over = torch.tensor([1.0, 1.0]), torch.tensor([4.0, 4.0]), torch.tensor([False, True])
     assert td_target(reward, following, over, 0.5).tolist() == [3.0, 1.0]
 
 
 def test_double_estimate_matches_hand_calculation() -> None:
-    """One network picks the move, the other one values it."""
+    """One network selects the move, the other values it."""
     value, picker = torch.tensor([[1.0, 5.0, 0.0]]), torch.tensor([[3.0, 2.0, 0.0]])
     assert best_move_value(value, value).tolist() == [5.0]
     assert best_move_value(value, picker).tolist() == [1.0]
@@ -39,7 +39,7 @@ def without_heads(learner: Dqn, bid: float, reserve: float) -> None:
     [(7.0, 3.0, 4.0), (2.0, 3.0, 0.0)],
 )
 def test_targets_match_the_definition(bid: float, reserve: float, following: float) -> None:
-    """Stopping follows for 0 where all bids are below the reserve; where no bid is open, nothing else can follow."""
+    """Stopping has value 0 if all bids are below the reserve, and is the only action without open bids."""
     learner = Dqn(parameters=DqnParameters(gamma=0.5, double_q=False))
     without_heads(learner, bid, reserve)
     board = probe("right_task").board[torch.arange(2)]
@@ -51,7 +51,7 @@ def test_targets_match_the_definition(bid: float, reserve: float, following: flo
 
 
 def test_truncated_game_is_bootstrapped() -> None:
-    """The last move of a game cut off by the number of steps is followed by the value of the state after it."""
+    """The last move of a game truncated by the step limit is followed by the value of the next state."""
     learner = Dqn(parameters=DqnParameters(gamma=0.5, double_q=False))
     without_heads(learner, 7.0, 3.0)
     board = probe("pairing").board[torch.arange(3)]
@@ -66,7 +66,7 @@ def flat(network: torch.nn.Module) -> Tensor:
 
 
 def test_target_network_is_updated_periodically() -> None:
-    """The target network holds still for as many updates as the parameter says, and is then the one that learns."""
+    """The target network is constant for the given number of updates, and then equals the online network."""
     learner = Dqn(parameters=DqnParameters(target_update_interval=3, replay_ratio=0.0))
     learner.train_on(TrainingJob(0, 50, curriculum=probe("pairing")))
     learner.updates = 0
@@ -79,13 +79,13 @@ def test_target_network_is_updated_periodically() -> None:
 
 
 def test_job_depends_only_on_state_and_job() -> None:
-    """Stored with its memory between jobs and restored in another learner, training continues bit for bit."""
+    """Stored with its replay buffer and restored in another learner, training continues bit for bit."""
     assert_resumes_elsewhere(Dqn)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", PROBES)
 def test_dqn_solves_probes(name: str) -> None:
-    """Games with known answers are solved, all of them."""
+    """All games with known answers are solved."""
     learner = Dqn(parameters=DqnParameters(learning_rate=3e-3, replay_ratio=8.0))
     assert share_learned(learner, name, decisions=60) == 1.0

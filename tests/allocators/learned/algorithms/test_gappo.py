@@ -35,14 +35,14 @@ def rate(member: StateDict) -> float:
 
 
 def test_fitness_matches_hand_calculation() -> None:
-    """(12): each term relative to the largest of the population; the cost is subtracted."""
+    """(12): each term is relative to the largest of the population; the cost is subtracted."""
     parameters = BreedingParameters(return_weight=1.0, entropy_weight=0.5, cost_weight=0.25)
     got = fitness([2.0, 4.0], [1.0, 0.5], [100, 50], parameters)
     assert got == pytest.approx([0.5 + 0.5 - 0.25, 1.0 + 0.25 - 0.125])
 
 
 def test_elite_passes_unchanged() -> None:
-    """The two fittest are in the next generation as they are."""
+    """The two fittest members are in the next generation unchanged."""
     before = members(4)
     after = breed(before, [0.1, 0.9, 0.5, 0.2], BreedingParameters(), seed=1)
     assert len(after) == 4
@@ -52,7 +52,7 @@ def test_elite_passes_unchanged() -> None:
 
 @pytest.mark.parametrize("count", [1, 2, 3])
 def test_small_populations_breed(count: int) -> None:
-    """There is a child among two members, however large the elite; a single member stays as it is."""
+    """Two members have a child, however large the elite; a single member stays unchanged."""
     before = members(count)
     after = breed(before, list(range(count)), BreedingParameters(elite=5, mutation_probability=1.0), seed=1)
     assert len(after) == count
@@ -61,7 +61,7 @@ def test_small_populations_breed(count: int) -> None:
 
 
 def test_children_without_mutation_lie_between_their_parents() -> None:
-    """Crossover blends weight by weight, so that each lies between those of two members."""
+    """Crossover blends weights, so that each lies between those of both parents."""
     before = members(3)
     parameters = BreedingParameters(elite=1, crossover_probability=1.0, mutation_probability=0.0)
     everyone = torch.stack([weights(member) for member in before])
@@ -71,7 +71,7 @@ def test_children_without_mutation_lie_between_their_parents() -> None:
 
 
 def test_mutation_changes_some_weights_and_the_step_size_a_little() -> None:
-    """About a tenth of the weights change, the learning rate by a quarter; the parent keeps its own."""
+    """About a tenth of the weights and the learning rate (by a quarter) change; the parent is not modified."""
     before = members(2)
     kept = [weights(member).clone() for member in before]
     rates = [rate(member) for member in before]
@@ -85,7 +85,7 @@ def test_mutation_changes_some_weights_and_the_step_size_a_little() -> None:
 
 
 def test_children_are_loadable_states() -> None:
-    """A child has its parent's optimiser and weights of its own, and shares no storage with the parent."""
+    """A child has its parent's optimiser and its own weights, and shares no storage with the parent."""
     before = members(2)
     child = breed(before, [1.0, 0.0], BreedingParameters(elite=1, mutation_probability=1.0), seed=0)[1]
     learner = Ppo(SMALL)
@@ -97,7 +97,7 @@ def test_children_are_loadable_states() -> None:
 
 
 def test_breeding_is_seeded_and_leaves_the_global_generator_alone() -> None:
-    """The same seed breeds the same children, and Python's global generator is not drawn from."""
+    """The same seed gives the same children, and Python's global generator is not used."""
     random.seed(42)
     expected = random.Random(42).random()
     one = breed(members(4), [1.0, 2.0, 3.0, 4.0], BreedingParameters(), seed=7)
@@ -107,7 +107,7 @@ def test_breeding_is_seeded_and_leaves_the_global_generator_alone() -> None:
 
 
 def test_operators_match_deap_with_their_own_generator(monkeypatch: pytest.MonkeyPatch) -> None:
-    """With the same seed the outcome is that of DEAP's own operators, without the global generator."""
+    """With the same seed the outcome equals that of DEAP's operators, without the global generator."""
     parents = [_Genome([float(number), -1.0, 2.5], number, float(number % 3)) for number in range(5)]
 
     def bred(select: Callable[..., Any], mate: Callable[..., Any], mutate: Callable[..., Any]) -> list[list[float]]:

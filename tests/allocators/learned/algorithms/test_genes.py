@@ -25,7 +25,7 @@ def job(seed: int = 1, decisions: int = 60) -> TrainingJob:
 
 
 def test_gene_changes_only_biases_and_is_reversible() -> None:
-    """What a member adds is in the vectors of one dimension; expressing the first member gives the first weights."""
+    """A gene adds only to one-dimensional parameters; expressing the first member restores the first weights."""
     (network,) = initialised(SMALL, 3, 1)
     before = copy.deepcopy(network)
     genes = Genes(network, 3, 0.1, seed=1)
@@ -37,7 +37,7 @@ def test_gene_changes_only_biases_and_is_reversible() -> None:
 
 
 def test_single_member_learns_exactly_as_ppo() -> None:
-    """With one gene the weights are those of `Ppo`, bit by bit."""
+    """With one gene the weights equal those of `Ppo` bit by bit."""
     parameters = GappoParameters(genes=1)
     one, other = GeneticPpo(SMALL, parameters, seed=2), Ppo(SMALL, parameters, seed=2)
     assert one.train_on(job()) == other.train_on(job())
@@ -45,7 +45,7 @@ def test_single_member_learns_exactly_as_ppo() -> None:
 
 
 def test_members_take_turns_and_breed() -> None:
-    """Three members share decisions, replay and weights; after a generation the fittest's gene comes first."""
+    """Three members share decisions, replay and weights; after a generation the fittest gene comes first."""
     learner = GeneticPpo(SMALL, GappoParameters(genes=3, breeding_interval=3, gene_sigma=0.1), seed=4)
     first = learner.genes.vectors.clone()
     shown: list[int] = []
@@ -61,7 +61,7 @@ def test_members_take_turns_and_breed() -> None:
 
 
 def test_genes_are_constant_without_generations() -> None:
-    """With an interval of 0 members take turns, and nothing is bred."""
+    """With an interval of 0 members take turns, but are not bred."""
     learner = GeneticPpo(SMALL, GappoParameters(genes=2, breeding_interval=0, gene_sigma=0.1), seed=4)
     first = learner.genes.vectors.clone()
     for seed in range(3):
@@ -71,7 +71,7 @@ def test_genes_are_constant_without_generations() -> None:
 
 
 def test_fittest_member_is_the_policy() -> None:
-    """The member with the highest returns is expressed after a generation, and is the first of all policies."""
+    """After a generation the member with the highest returns is expressed, and is the first policy."""
     learner = GeneticPpo(SMALL, GappoParameters(genes=2, breeding_interval=2, gene_sigma=0.1), seed=4)
     best = learner.genes.vectors[1].clone()
     learner.train_on(job(1, decisions=1))

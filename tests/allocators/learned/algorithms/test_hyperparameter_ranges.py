@@ -31,7 +31,7 @@ KINDS = (A2cParameters, BreedingParameters, DdpgParameters, DqnParameters, Gappo
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_number_has_a_range(kind: type[Any]) -> None:
-    """No number of any method goes unchecked, and nothing but numbers passes."""
+    """All numbers of all methods are checked, and only numbers are accepted."""
     for field in fields(kind):
         if isinstance(field.default, bool):
             continue
@@ -67,7 +67,7 @@ def test_every_number_has_a_range(kind: type[Any]) -> None:
     ],
 )
 def test_values_outside_ranges_are_refused(kind: type[Any], name: str, wrong: Any) -> None:
-    """What divides by nothing, learns nothing or moves away is out, also where other parameters are changed."""
+    """Values that cause a division by zero, no learning or divergence are refused, however they are set."""
     with pytest.raises(InputError, match=f"{name}: must be a"):
         kind(**{name: wrong})
     with pytest.raises(InputError, match=f"{name}: must be a"):
@@ -75,21 +75,21 @@ def test_values_outside_ranges_are_refused(kind: type[Any], name: str, wrong: An
 
 
 def test_values_at_the_ends_of_ranges_are_accepted() -> None:
-    """The ends that make sense are in, and so are numbers of numpy's."""
+    """Sensible extreme values and NumPy numbers are accepted."""
     assert PpoParameters(buffer_size=0, gae_lambda=0, gamma=1, learning_rate=1, ent_coef=0.0, target_kl=None)
     assert PpoParameters(update_epochs=np.int64(2), clip_coef=np.float32(0.5))  # type: ignore[arg-type]
     assert BreedingParameters(elite=0, mutation_probability=0, crossover_probability=1, mutation_sigma=0)
 
 
 def test_entropy_bonus_of_zero_stays_zero() -> None:
-    """A bonus that begins at 0 stays there."""
+    """A bonus with initial value 0 stays 0."""
     curriculum, _ = games_on([paper_like(8, 2, 35, 0)], Curriculum(games=(2, 2)))
     learner = Ddpg(NetworkSize(4, 4, 1), DdpgParameters(ent_coef=0.0))
     assert learner.train_on(TrainingJob(0, 20, curriculum, progress=0.5)).decisions >= 20
 
 
 def test_torch_is_not_loaded() -> None:
-    """Whoever sets hyperparameters wrong is told so before the seconds that torch takes."""
+    """Wrong hyperparameters are reported without loading torch."""
     code = (
         "import sys, alloc.allocators.learned.algorithms.registry as registry\n"
         "registry.method_parameters('gappo'); print('torch' in sys.modules)"

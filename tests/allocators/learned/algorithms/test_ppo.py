@@ -59,13 +59,13 @@ def played(learner: Ppo, board: Board, rules: Rules = PLANNING, steps: int = 3, 
 def test_clipped_surrogate_matches_the_definition(
     ratio: float, advantage: float, centre: float, expected: float
 ) -> None:
-    """(13), (14) with epsilon 0.2 around 1 and around other centres: gains are clipped, losses are not."""
+    """(13), (14) with epsilon 0.2 around 1 and other centres: gains are clipped, losses are not."""
     got = clipped_surrogate(torch.tensor([ratio]), torch.tensor([advantage]), 0.2, torch.tensor([centre]))
     assert got.item() == pytest.approx(expected)
 
 
 def test_surrogate_has_no_gradient_beyond_the_clip() -> None:
-    """The surrogate has a slope within the clip, and none where a gain lies beyond it."""
+    """The surrogate has a gradient within the clipping interval, and none for gains beyond it."""
     ratio = torch.tensor([1.1, 1.3, 0.7, 1.3, 0.7], requires_grad=True)
     clipped_surrogate(ratio, torch.tensor([2.0, 2.0, -2.0, -2.0, 2.0]), 0.2).sum().backward()
     assert ratio.grad is not None
@@ -89,19 +89,19 @@ def test_value_loss_matches_hand_calculation() -> None:
     ],
 )
 def test_learning_rate_adapts_to_the_divergence(divergence: float, target: float | None, expected: float) -> None:
-    """Twice too far slows learning down, half too near speeds it up, and without a target nothing does."""
+    """It falls above twice the target, rises below half of it, and is constant without a target."""
     assert adapted_learning_rate(1e-3, divergence, target, 1.0) == pytest.approx(expected)
 
 
 def test_learning_rate_is_bounded() -> None:
-    """It does not grow beyond the highest, nor fall below the lowest, but for a highest that is lower still."""
+    """It stays between the lowest and the highest value, unless the highest is below the lowest."""
     assert adapted_learning_rate(1e-3, 0.0, 0.01, 1.2e-3) == 1.2e-3
     assert adapted_learning_rate(1.1 * MIN_LEARNING_RATE, 1.0, 0.01, 1.0) == MIN_LEARNING_RATE
     assert adapted_learning_rate(1e-3, 0.0, 0.01, 1e-6) == 1e-6
 
 
 def test_schedule_lowers_the_learning_rate() -> None:
-    """Without a target the step size falls with progress, from the highest to a share of it."""
+    """Without a target the learning rate decreases with progress to a fraction of its initial value."""
     learner = Ppo(SMALL, PpoParameters(learning_rate=1.0, max_learning_rate=1e-3, final_lr_fraction=0.1))
     for progress, expected in ((0.0, 1e-3), (0.5, 0.55e-3), (1.0, 1e-4)):
         learner.train_on(TrainingJob(0, 1, probe("pairing"), progress))
@@ -110,7 +110,7 @@ def test_schedule_lowers_the_learning_rate() -> None:
 
 @both_turns
 def test_samples_of_fresh_games(board: Board, rules: Rules) -> None:
-    """A sample for each state of a game still on; advantages have mean 0 and deviation 1 over the actions."""
+    """One sample per state of running games; advantages have mean 0 and standard deviation 1 over actions."""
     parameters = PpoParameters(gamma=0.9, gae_lambda=0.5)
     learner = Ppo(SMALL, parameters)
     fresh = played(learner, board, rules, steps=30)
@@ -157,7 +157,7 @@ def test_update_follows_the_gradient_of_the_loss(board: Board, rules: Rules) -> 
 
 
 def test_probabilities_follow_advantages(board: Board) -> None:
-    """After an update the change of each action's probability goes with its advantage."""
+    """After an update the change of each action's probability has the sign of its advantage."""
     learner = Ppo(SMALL, PpoParameters(ent_coef=0.0, vf_coef=0.0))
     fresh = played(learner, board)
     samples = on_policy_samples(fresh, learner.parameters)
@@ -170,7 +170,7 @@ def test_probabilities_follow_advantages(board: Board) -> None:
 
 
 def test_divergence_grows_with_the_step(board: Board) -> None:
-    """No step, no divergence; and a longer step diverges more, so that the rate can follow."""
+    """Without a step the divergence is 0, and larger steps diverge more."""
     found = []
     for rate in (0.0, 1e-4, 1e-2):
         learner = Ppo(SMALL, PpoParameters(learning_rate=1e-2))
@@ -182,7 +182,7 @@ def test_divergence_grows_with_the_step(board: Board) -> None:
 
 @both_turns
 def test_reuse_by_the_same_network_gives_the_same_samples(board: Board, rules: Rules) -> None:
-    """Trajectories that today's network played itself are the same samples, fresh or from the buffer."""
+    """Trajectories of the current network give the same samples, fresh or from the buffer."""
     learner = Ppo(SMALL, PpoParameters(minibatch_size=2))
     fresh = played(learner, board, rules, steps=30)
     new, again = (
@@ -197,7 +197,7 @@ def test_reuse_by_the_same_network_gives_the_same_samples(board: Board, rules: R
 
 @both_turns
 def test_reuse_by_another_network_is_importance_corrected(board: Board, rules: Rules) -> None:
-    """Ratios of old samples are centred where today's policy is, and traces cut by how likely whole steps are."""
+    """Ratios of old samples are centred at the current policy, and traces truncated by the ratio of whole steps."""
     parameters = PpoParameters(gamma=0.9, gae_lambda=0.8)
     old, new = Ppo(SMALL, seed=1), Ppo(SMALL, seed=2)
     kept = played(old, board, rules, steps=4)
@@ -221,7 +221,7 @@ def test_reuse_by_another_network_is_importance_corrected(board: Board, rules: R
 
 
 def test_single_decision_leaves_weights_finite() -> None:
-    """One agent, one task, one step: nothing can be compared, and nothing breaks."""
+    """One agent, one task, one step: nothing can be compared, and weights stay finite."""
     board = layout(Instance(ability=[1], workload=[1]))
     learner = Ppo(SMALL)
     learner.update(played(learner, board, steps=1), [], PLANNING, torch.Generator(), max_rate=1e-3)
@@ -229,7 +229,7 @@ def test_single_decision_leaves_weights_finite() -> None:
 
 
 def test_extreme_games_leave_weights_finite() -> None:
-    """Figures of all sizes, and tasks that nobody can do, leave weights finite."""
+    """Extreme magnitudes and unservable tasks leave weights finite."""
     wild = [
         Instance(ability=[1e-9, 1e9], workload=[1e9, 1e-9], priority=[1e9, 0]),
         Instance(ability=[1, 2], workload=[1, 2], allowed_tasks=[[], []]),
@@ -247,7 +247,7 @@ def test_extreme_games_leave_weights_finite() -> None:
 
 
 def test_buffer_is_used_for_learning() -> None:
-    """With a buffer the second job's updates differ from those without, and cost more evaluations."""
+    """With a buffer the updates of the second job differ from those without, and cost more evaluations."""
     costs, ends = [], []
     for capacity in (0, 10_000):
         learner = Ppo(SMALL, PpoParameters(buffer_size=capacity))
@@ -261,7 +261,7 @@ def test_buffer_is_used_for_learning() -> None:
 
 
 def test_job_statistics_match_the_games() -> None:
-    """Decisions reach those of the job; rewards are in the units of the utility, whatever their scale."""
+    """Decisions reach the number requested; rewards are in units of the utility, whatever their scale."""
     games = probe("pairing")
     reports = [
         Ppo(SMALL, PpoParameters(reward_scale=scale)).train_on(TrainingJob(0, 100, games)) for scale in (1.0, 50.0)
@@ -277,13 +277,13 @@ def test_job_statistics_match_the_games() -> None:
 
 @pytest.mark.parametrize("parameters", [PpoParameters(), GappoParameters()], ids=["ppo", "gappo"])
 def test_job_depends_only_on_state_and_job(parameters: PpoParameters) -> None:
-    """Stored with its buffer between jobs and restored in another learner, training continues bit for bit."""
+    """Stored with its buffer and restored in another learner, training continues bit for bit."""
     assert_resumes_elsewhere(lambda seed: Ppo(SMALL, parameters, seed))
 
 
 @pytest.mark.slow
 def test_rewards_rise_with_simultaneous_choices() -> None:
-    """Rewards rise to nine tenths of the best there is under the other turn rule as well."""
+    """Rewards rise to nine tenths of the optimum under the other turn rule as well."""
     games, learner = probe("right_task"), Ppo(SMALL, PpoParameters(learning_rate=3e-3))
     best = float((best_utility(games.board) - utility(games.board, reset(games.board), AT_ONCE)).mean())
     rewards = [learner.train_on(TrainingJob(seed, 150, games, rules=AT_ONCE)).reward for seed in range(28)]
@@ -291,7 +291,7 @@ def test_rewards_rise_with_simultaneous_choices() -> None:
 
 
 def test_initial_weights_use_their_own_generator() -> None:
-    """The seed of the first weights is the learner's own: torch's generator goes on as if nothing had happened."""
+    """The initial weights have their own seed; torch's global generator is not used."""
     torch.manual_seed(5)
     expected = torch.rand(3)
     torch.manual_seed(5)

@@ -12,14 +12,14 @@ from alloc.problems import InputError
 
 
 def test_learners_are_made_by_name() -> None:
-    """A name gives a learner of this size."""
+    """A name gives a learner of the given size."""
     learner = new_learner("ppo", NetworkSize(8, 8, 2), PpoParameters(), 0)
     assert isinstance(learner, Ppo)
     assert learner.policy.size == NetworkSize(8, 8, 2)
 
 
 def test_settings_are_parsed_by_the_type_of_their_defaults() -> None:
-    """Whole numbers, broken ones and none are told apart."""
+    """Integers, decimals and none are distinguished."""
     read = method_parameters("ppo", {"update_epochs": "5", "clip_coef": "0.1", "target_kl": "none"})
     assert read == PpoParameters(update_epochs=5, clip_coef=0.1, target_kl=None)
 
@@ -39,14 +39,14 @@ def test_settings_are_parsed_by_the_type_of_their_defaults() -> None:
     ],
 )
 def test_wrong_settings_are_reported(method: str, settings: dict[str, str], message: str) -> None:
-    """Unknown methods, unknown parameters, unreadable values and such out of range are told."""
+    """Unknown methods and parameters, unreadable values, and values out of range are reported."""
     with pytest.raises(InputError, match=message):
         method_parameters(method, settings)
 
 
 @pytest.mark.parametrize("method", METHODS)
 def test_unknown_parameter_error_lists_all_parameters(method: str) -> None:
-    """All names and defaults of the method are listed, just as they are set."""
+    """All names and defaults of the method are listed in the form in which they are set."""
     with pytest.raises(InputError) as caught:
         method_parameters(method, {"unknown": "1"})
     listed = caught.value.message.rpartition(": ")[2].split(", ")

@@ -37,13 +37,13 @@ def drawn(replay: ReplayBuffer, draws: int = 60) -> list[Trajectories]:
 
 
 def test_empty_buffer_yields_nothing() -> None:
-    """None comes from a buffer in which nothing was put."""
+    """Nothing is drawn from an empty buffer."""
     assert ReplayBuffer(100).draw(torch.Generator()) is None
     assert len(ReplayBuffer(100)) == 0
 
 
 def test_oldest_trajectories_are_dropped_first(trajectories: list[Trajectories]) -> None:
-    """The states kept never exceed the capacity, and are those of the latest trajectories that fit in."""
+    """The number of states never exceeds the capacity, and the latest trajectories that fit are kept."""
     sizes = [one.evaluations for one in trajectories]
     replay = ReplayBuffer(sum(sizes[2:]))
     for number, one in enumerate(trajectories):
@@ -56,7 +56,7 @@ def test_oldest_trajectories_are_dropped_first(trajectories: list[Trajectories])
 
 
 def test_oversized_trajectories_are_not_kept(trajectories: list[Trajectories]) -> None:
-    """A trajectory beyond the capacity does not stay, and a buffer without capacity keeps nothing."""
+    """A trajectory beyond the capacity is not kept, and a buffer without capacity keeps nothing."""
     for capacity in (0, trajectories[0].evaluations - 1):
         replay = ReplayBuffer(capacity)
         replay.add(trajectories[0])
@@ -65,7 +65,7 @@ def test_oversized_trajectories_are_not_kept(trajectories: list[Trajectories]) -
 
 
 def test_trajectories_are_drawn_uniformly(trajectories: list[Trajectories]) -> None:
-    """Of 3,000 draws each of five trajectories gets 600, within four standard deviations."""
+    """In 3,000 draws each of five trajectories occurs 600 times, within four standard deviations."""
     replay, generator = ReplayBuffer(10_000), torch.Generator().manual_seed(2)
     for one in trajectories:
         replay.add(one)
@@ -74,7 +74,7 @@ def test_trajectories_are_drawn_uniformly(trajectories: list[Trajectories]) -> N
 
 
 def test_round_trip_through_a_file(trajectories: list[Trajectories]) -> None:
-    """Stored as tensors alone and read into another buffer, every number is the same, and so are the draws."""
+    """Stored as tensors and read into another buffer, all numbers and further draws are the same."""
     replay, again, file = ReplayBuffer(10_000), ReplayBuffer(10_000), io.BytesIO()
     for one in trajectories:
         replay.add(one)

@@ -24,7 +24,7 @@ def job(seed: int, decisions: int = 1) -> TrainingJob:
 
 
 def test_only_the_active_member_learns() -> None:
-    """The first member's update leaves the others' weights as those of `GeneticPpo`, and fills the buffer of all."""
+    """The active member's update keeps the weights of the others, and fills the common buffer."""
     parameters = GappoParameters(genes=3, gene_sigma=0.1)
     learner, shared = SeparateMembers(SMALL, parameters, seed=4), GeneticPpo(SMALL, parameters, seed=4)
     assert shared.train_on(job(1)).decisions == learner.train_on(job(1)).decisions
@@ -48,7 +48,7 @@ def test_fittest_member_comes_first() -> None:
 
 
 def test_restored_population_continues_identically() -> None:
-    """Weights, step sizes, the buffer and the returns since the last generation are the state."""
+    """Weights, learning rates, the buffer and the returns since the last generation are the state."""
     parameters = GappoParameters(genes=2, breeding_interval=4, gene_sigma=0.1)
     whole, half = SeparateMembers(SMALL, parameters, seed=5), SeparateMembers(SMALL, parameters, seed=0)
     whole.train_on(job(1))

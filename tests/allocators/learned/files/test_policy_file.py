@@ -23,7 +23,7 @@ def networks() -> list[ActorCritic]:
 
 
 def test_round_trip(tmp_path: Path, networks: list[ActorCritic]) -> None:
-    """Networks come back in order, weight for weight."""
+    """Networks are read back in order, weight for weight."""
     save_policy(tmp_path / "p.safetensors", networks, "gappo")
     for before, after in zip(networks, load_policy(tmp_path / "p.safetensors", "gappo"), strict=True):
         assert after.size == before.size
@@ -32,14 +32,14 @@ def test_round_trip(tmp_path: Path, networks: list[ActorCritic]) -> None:
 
 
 def test_missing_file_is_named(tmp_path: Path) -> None:
-    """A missing file is named."""
+    """The error names a missing file."""
     with pytest.raises(InputError, match=r"nowhere\.safetensors: no such policy file"):
         load_policy(tmp_path / "nowhere.safetensors", "gappo")
 
 
 @pytest.mark.parametrize("content", [b"", b"\0" * 7, b"hello, world", pickle.dumps({"a": 1}), b"\xff" * 64])
 def test_other_files_are_refused(tmp_path: Path, content: bytes) -> None:
-    """Whatever is no policy is refused in one line, pickles without being run."""
+    """Other files are refused in one line, and pickles are not executed."""
     path = tmp_path / "p.safetensors"
     path.write_bytes(content)
     with pytest.raises(InputError, match="is not a policy file") as caught:
@@ -48,7 +48,7 @@ def test_other_files_are_refused(tmp_path: Path, content: bytes) -> None:
 
 
 def test_folders_and_empty_names_are_refused(tmp_path: Path) -> None:
-    """A folder is called one, and no name at all is told."""
+    """A folder and an empty name are reported as such."""
     with pytest.raises(InputError, match="is a folder"):
         load_policy(tmp_path, "gappo")
     with pytest.raises(InputError, match="policy: names no file"):
@@ -56,7 +56,7 @@ def test_folders_and_empty_names_are_refused(tmp_path: Path) -> None:
 
 
 def test_policy_of_another_method_is_refused(tmp_path: Path, networks: list[ActorCritic]) -> None:
-    """A policy that another method trained is not used by mistake."""
+    """A policy trained by another method is refused."""
     save_policy(tmp_path / "p.safetensors", networks, "dqn")
     with pytest.raises(InputError, match="holds a policy of dqn; use it with the method dqn"):
         load_policy(tmp_path / "p.safetensors", "gappo")
@@ -67,7 +67,7 @@ def test_policy_of_another_method_is_refused(tmp_path: Path, networks: list[Acto
 
 @pytest.mark.parametrize("weight", [math.nan, math.inf, -math.inf])
 def test_non_finite_weights_are_refused(tmp_path: Path, networks: list[ActorCritic], weight: float) -> None:
-    """A policy of a training that went astray is refused, whichever network it is in."""
+    """A policy of a diverged training is refused, whichever network has diverged."""
     with torch.no_grad():
         next(networks[1].parameters()).flatten()[-1] = weight
     save_policy(tmp_path / "p.safetensors", networks, "gappo")
@@ -77,7 +77,7 @@ def test_non_finite_weights_are_refused(tmp_path: Path, networks: list[ActorCrit
 
 
 def test_same_networks_give_the_same_bytes(tmp_path: Path, networks: list[ActorCritic]) -> None:
-    """Files of two trainings that went alike are alike, and others can read them as before."""
+    """Equal trainings give equal files, readable as before."""
     figures = {"seed": 3, "place": "Århus"}
     files = [tmp_path / f"{number}.safetensors" for number in range(6)]
     for path in files:
@@ -89,7 +89,7 @@ def test_same_networks_give_the_same_bytes(tmp_path: Path, networks: list[ActorC
 
 
 def test_policy_of_another_feature_set_is_refused(tmp_path: Path, networks: list[ActorCritic]) -> None:
-    """A policy for other observations is an error, not a wrong answer."""
+    """A policy for other observations is an error."""
     save_policy(tmp_path / "p.safetensors", networks, "gappo")
     path = tmp_path / "p.safetensors"
     path.write_bytes(path.read_bytes().replace(FEATURE_SET.encode(), b"x" * len(FEATURE_SET)))
@@ -98,7 +98,7 @@ def test_policy_of_another_feature_set_is_refused(tmp_path: Path, networks: list
 
 
 def test_weights_of_other_sizes_are_refused(tmp_path: Path, networks: list[ActorCritic]) -> None:
-    """Weights of other sizes than the description says are refused."""
+    """Weights whose sizes contradict the metadata are refused."""
     save_policy(tmp_path / "p.safetensors", networks, "gappo")
     path = tmp_path / "p.safetensors"
     path.write_bytes(path.read_bytes().replace(b'pair_width\\": 8', b'pair_width\\": 9'))
@@ -107,7 +107,7 @@ def test_weights_of_other_sizes_are_refused(tmp_path: Path, networks: list[Actor
 
 
 def test_truncated_files_are_refused(tmp_path: Path, networks: list[ActorCritic]) -> None:
-    """A file cut short anywhere, in its head or in its weights, is refused in one line."""
+    """A file truncated in its header or its weights is refused in one line."""
     save_policy(tmp_path / "p.safetensors", networks, "gappo")
     path = tmp_path / "p.safetensors"
     whole = path.read_bytes()
@@ -119,7 +119,7 @@ def test_truncated_files_are_refused(tmp_path: Path, networks: list[ActorCritic]
 
 
 def test_file_with_fewer_networks_than_declared_is_refused(tmp_path: Path, networks: list[ActorCritic]) -> None:
-    """A file that promises more networks than it holds is refused."""
+    """A file with fewer networks than declared is refused."""
     save_policy(tmp_path / "p.safetensors", networks, "gappo")
     path = tmp_path / "p.safetensors"
     path.write_bytes(path.read_bytes().replace(b'"networks":"2"', b'"networks":"3"'))
@@ -128,14 +128,14 @@ def test_file_with_fewer_networks_than_declared_is_refused(tmp_path: Path, netwo
 
 
 def test_tensors_without_metadata_are_refused(tmp_path: Path) -> None:
-    """A safetensors file from elsewhere is no policy."""
+    """A foreign safetensors file is not a policy."""
     save_file({"a": torch.zeros(2)}, tmp_path / "p.safetensors")
     with pytest.raises(InputError, match="does not describe its networks"):
         load_policy(tmp_path / "p.safetensors", "gappo")
 
 
 def test_policies_for_other_turns_are_refused(tmp_path: Path) -> None:
-    """What agents that choose at once learned does not bid; training goes on from it all the same."""
+    """A policy trained with simultaneous choices cannot bid; training can continue from it."""
     path = tmp_path / "policy.safetensors"
     save_policy(path, [ActorCritic()], "ppo", {"turn": "simultaneous"})
     with pytest.raises(InputError, match=r"turn: was trained for turns by simultaneous"):

@@ -10,7 +10,7 @@ from alloc.problems import InputError
 
 
 def test_policies_of_missions_are_recognised(tmp_path: Path) -> None:
-    """Policies of missions are told from other safetensors, so that such a training can be resumed."""
+    """Policies of missions differ from other safetensors files, so that such a training can be resumed."""
     files = RunFiles.beside(tmp_path / "p.safetensors", None, None, None)
     files.policy.write_bytes(SHIPPED.read_bytes())
     files.checkpoint.touch()

@@ -17,7 +17,7 @@ class Line:
 
 
 def test_lines_are_appended_to_the_history(tmp_path: Path) -> None:
-    """The file begins anew with what is known, and grows line by line."""
+    """The file is rewritten with the known history, and grows line by line."""
     path = tmp_path / "log.csv"
     path.write_text("what an interrupted run left")
     with TrainingLog(Line, path, None, [Line(10, 0.5)]) as log:
@@ -27,7 +27,7 @@ def test_lines_are_appended_to_the_history(tmp_path: Path) -> None:
 
 @pytest.mark.needs("tensorboard")
 def test_events_contain_every_column(tmp_path: Path) -> None:
-    """TensorBoard shows each column over the decisions; steps that a resumed run repeats appear once."""
+    """TensorBoard shows each column by decisions; steps repeated by a resumed run appear once."""
     from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
     with TrainingLog(Line, tmp_path / "log.csv", tmp_path / "events", []) as log:
@@ -40,7 +40,7 @@ def test_events_contain_every_column(tmp_path: Path) -> None:
 
 
 def test_missing_tensorboard_names_the_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Whoever asks for event files is told what to install, and nothing is written."""
+    """The error says what to install, and nothing is written."""
     monkeypatch.setitem(sys.modules, "torch.utils.tensorboard", None)
     with pytest.raises(InputError, match=r"alloc-mrta\[train\]"):
         TrainingLog(Line, tmp_path / "log.csv", tmp_path / "events", [])

@@ -38,7 +38,7 @@ def pair(metric: str = "euclidean") -> Mission:
 
 @pytest.mark.parametrize("metric", ["euclidean", "manhattan"])
 def test_free_agents_at_one_place_choose_different_tasks(tmp_path: Path, metric: str) -> None:
-    """Two agents that know the same at the same hour go to different tasks, without a message, and none turns round."""
+    """Two agents with equal knowledge choose different tasks without a message, and neither turns back."""
     save_network(tmp_path / "policy.safetensors", first_network(3), "gappo")
     run = simulate(pair(metric), NetworkPolicy(policy=tmp_path / "policy.safetensors"))
     orders = {one["agent"]: one["task"] for one in run.log.records if one["record"] == "order" and one["hour"] == 0}
@@ -53,7 +53,7 @@ PLACES = [[0.0, 0.0], [0.4, 0.6]]
 
 @pytest.mark.parametrize(("metric", "rivals"), [("euclidean", 1), ("manhattan", 0)])
 def test_nearer_agents_are_determined_by_the_metric(metric: str, rivals: int) -> None:
-    """An agent is told of another without a task as nearer if it is so by the metric of the instance."""
+    """Whether another free agent is nearer to a task depends on the metric of the instance."""
     instance = Instance(
         ability=[1, 1], workload=[9], agent_position=PLACES, task_position=[[1.0, 0.0]], speed=[1, 1], metric=metric
     )
@@ -66,7 +66,7 @@ def test_nearer_agents_are_determined_by_the_metric(metric: str, rivals: int) ->
 
 @pytest.mark.parametrize(("ways", "rivals"), [(known.EUCLIDEAN_WAYS, 1), (known.MANHATTAN_WAYS, 0)])
 def test_nearer_agents_are_determined_by_the_metric_for_agents_in_turn(ways: int, rivals: int) -> None:
-    """Agents that decide in turn are told the same."""
+    """The same holds for agents that decide in turn."""
     together = together_for(2, 1)
     together.own[:, [known.X, known.Y]] = PLACES
     together.own[:, known.TARGET], together.own[:, known.METRIC], together.ways[0, 0] = -1, ways, 1.0

@@ -31,7 +31,7 @@ def scored(options: np.ndarray, seed: int) -> np.ndarray:
 
 
 def test_compiled_scores_match_torch() -> None:
-    """The compiled network gives the scores of the torch module, also where the latter has rows that are no option."""
+    """The compiled network gives the scores of the torch module, also if that has padding rows."""
     options = np.random.default_rng(0).normal(size=(7, FEATURES)).astype(np.float32)
     filled = torch.zeros(1, 9, FEATURES)
     filled[0, :7] = torch.tensor(options)
@@ -42,7 +42,7 @@ def test_compiled_scores_match_torch() -> None:
 
 
 def test_scores_do_not_depend_on_the_order_of_options() -> None:
-    """Options in another order have the same scores in that order."""
+    """Permuted options have permuted scores."""
     rng = np.random.default_rng(1)
     options, order = rng.normal(size=(6, FEATURES)).astype(np.float32), rng.permutation(6)
     assert scored(options[order], 2) == pytest.approx(scored(options, 2)[order], abs=1e-5)
@@ -62,7 +62,7 @@ def test_scores_do_not_depend_on_the_order_of_options() -> None:
 def test_policy_gives_the_same_measures_in_both_simulations(
     tmp_path: Path, family: str, knowledge: str, size: tuple[int, int]
 ) -> None:
-    """The policy by the contract, and the compiled one, reach the same measures."""
+    """The Python policy and the compiled one reach the same measures."""
     network = first_network(3)
     save_network(tmp_path / "policy.safetensors", network, "gappo")
     mission = random_mission(MissionParameters(family, *size, knowledge=knowledge), 4)
@@ -76,7 +76,7 @@ def test_policy_gives_the_same_measures_in_both_simulations(
 
 
 def test_message_rate_depends_on_news() -> None:
-    """After the first two, every tenth time; news goes out as soon as that allows; one message is kept for it."""
+    """After the first two, one message per ten periods; news is sent as soon as possible, with one message reserved."""
     counted, news = np.zeros(1, np.intp), np.zeros(1, np.intp)
     saved = room_for(1, 1, 10).saved  # of three messages
     sent = []
@@ -88,7 +88,7 @@ def test_message_rate_depends_on_news() -> None:
 
 
 def test_policy_file_for_instances_is_refused(tmp_path: Path) -> None:
-    """A policy file for instances is refused with what to do."""
+    """A policy file for instances is refused with advice."""
     from alloc.allocators.learned.missions import policy_file
 
     instances = policy_file.SHIPPED.with_name("gappo.safetensors")

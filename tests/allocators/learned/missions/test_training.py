@@ -36,7 +36,7 @@ def weights_of(trainer: MissionTrainer) -> torch.Tensor:
 
 
 def test_resumed_run_gives_the_same_curve(tmp_path: Path) -> None:
-    """A run that is stored in its evolution, and one that is not interrupted, have the same members and reports."""
+    """A run resumed in its evolution phase has the same members and reports as an uninterrupted one."""
     whole, stored, resumed = (MissionTrainer(TINY, 3) for _ in range(3))
     for _ in range(3):
         whole.advance()
@@ -51,14 +51,14 @@ def test_resumed_run_gives_the_same_curve(tmp_path: Path) -> None:
 
 
 def test_checkpoint_with_other_parameters_is_refused(tmp_path: Path) -> None:
-    """A checkpoint of other parameters is refused."""
+    """A checkpoint of a run with other parameters is refused."""
     MissionTrainer(TINY, 3).save(tmp_path / "run.checkpoint")
     with pytest.raises(InputError, match="candidates"):
         MissionTrainer(replace(TINY, candidates=6), 3).resume(tmp_path / "run.checkpoint")
 
 
 def test_trained_policy_can_be_loaded(tmp_path: Path) -> None:
-    """The policy file of a run holds its best network."""
+    """The policy file of a run contains its best network."""
     trainer = MissionTrainer(TINY, 1)
     trainer.advance()
     trainer.write_policy(tmp_path / "policy.safetensors")
@@ -67,13 +67,13 @@ def test_trained_policy_can_be_loaded(tmp_path: Path) -> None:
 
 
 def test_unknown_families_are_refused(tmp_path: Path) -> None:
-    """A family that there is not is named with the nearest one."""
+    """The error for an unknown family names the most similar one."""
     with pytest.raises(InputError, match="steady"):
         train_on_missions("gappo", tmp_path / "policy.safetensors", families=["stedy"])
 
 
 def test_curriculum_becomes_harder() -> None:
-    """At first missions are of one family; later of all sorts, and of sizes within its bounds."""
+    """The first missions are of one family; later ones of all families and of sizes within the given range."""
     curriculum, rng = MissionCurriculum(agents=(2, 3), tasks=(2, 4)), np.random.default_rng(0)
     early = {len(mission.arrays.events) > 0 for mission, _ in curriculum.draw(rng, 3, 0.0)}
     late = curriculum.draw(rng, 12, 1.0)
@@ -84,7 +84,7 @@ def test_curriculum_becomes_harder() -> None:
 
 
 def test_advantages_are_relative_to_other_episodes() -> None:
-    """The advantage of a decision is what other plays lost more in the same hours, 0 on average."""
+    """The advantage of a decision is the excess cost of other episodes in the same hours; its mean is 0."""
     group = [record_for(1, 1, 2, ideal=4.0) for _ in range(3)]
     for record, lost in zip(group, (0.0, 1.0, 2.0), strict=True):
         record.length[0], record.asked[0] = 2, 10.0

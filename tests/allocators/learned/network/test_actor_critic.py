@@ -22,7 +22,7 @@ def network(request: pytest.FixtureRequest) -> ActorCritic:
 
 
 def test_network_is_permutation_equivariant(network: ActorCritic) -> None:
-    """Names of agents and tasks do not matter, neither to bids, nor to reserve and value."""
+    """Permuting agents and tasks permutes the bids, and changes neither reserve nor value."""
     instance = paper_like(12, 4, 50, seed=0)
     agents, tasks = np.random.default_rng(1).permutation(12), np.random.default_rng(2).permutation(4)
     other = Instance(
@@ -40,7 +40,7 @@ def test_network_is_permutation_equivariant(network: ActorCritic) -> None:
 
 
 def test_batched_games_are_scored_as_single_ones(network: ActorCritic) -> None:
-    """What a network says of a game does not depend on the other games of the batch."""
+    """The outputs for a game do not depend on the other games of the batch."""
     board = layout(*(paper_like(8, 3, 34, seed) for seed in range(5)))
     together = network(board, reset(board))
     for game in range(5):
@@ -50,7 +50,7 @@ def test_batched_games_are_scored_as_single_ones(network: ActorCritic) -> None:
 
 
 def test_sparse_candidates_are_scored_as_on_the_dense_board(network: ActorCritic) -> None:
-    """The pointer looks up the same places whether candidates are all tasks or some in any order."""
+    """Scores do not depend on whether candidates are all tasks or some in any order."""
     instance = paper_like(20, 9, 90, seed=4)
     dense, near = layout(instance), layout(instance, near=5)
     scale = (dense.scale / near.scale).float()  # the two boards measure distances by their own means
@@ -66,7 +66,7 @@ def test_sparse_candidates_are_scored_as_on_the_dense_board(network: ActorCritic
 
 
 def test_agents_without_ability_do_not_affect_encodings() -> None:
-    """Padding agents of a region change nothing of the encodings of places."""
+    """Padding agents of a region do not change the encodings of places."""
     torch.manual_seed(2)
     network = ActorCritic(SIZES["attention"]).requires_grad_(False)
     board = layout(paper_like(8, 3, 34, 0))
@@ -85,7 +85,7 @@ def test_agents_without_ability_do_not_affect_encodings() -> None:
 
 @pytest.mark.parametrize("name", list(EXTREMES))
 def test_extremes_stay_finite(network: ActorCritic, name: str) -> None:
-    """Scores and gradients are finite on instances at the ends of what is valid."""
+    """Scores and gradients are finite on extreme valid instances."""
     board = layout(EXTREMES[name])
     state = reset(board)
     for slot in (state.slot, torch.full_like(state.slot, board.shape[2] - 1)):
@@ -96,7 +96,7 @@ def test_extremes_stay_finite(network: ActorCritic, name: str) -> None:
 
 
 def test_attention_depends_on_group_members_and_neighbours() -> None:
-    """Two equals that exchange places change what all places know; without attention nobody notices."""
+    """Swapping two equal agents changes the encodings of all places, but not without attention."""
     instance = Instance(
         ability=[1, 1, 1], workload=[1, 1, 1], task_position=[[0, 0], [1, 0], [2, 0]], start_task=[0, 1, 2]
     )

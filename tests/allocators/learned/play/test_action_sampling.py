@@ -115,7 +115,7 @@ every_turn = pytest.mark.parametrize("rules", [PLANNING, ONE_MOVE, AT_ONCE], ids
 
 @every_turn
 def test_probabilities_match_plain_python(board: Board, rules: Rules) -> None:
-    """Each possible round is as probable as its product of softmaxes says, and all together are certain."""
+    """Each possible round has the product of softmaxes as its probability, and these sum to 1."""
     state, scores = reset(board), scores_of(board)
     expected = chances(board, state, scores, rules)
     assert sum(expected.values()) == pytest.approx(1)
@@ -131,7 +131,7 @@ def test_probabilities_match_plain_python(board: Board, rules: Rules) -> None:
 
 @every_turn
 def test_sample_frequencies_match_probabilities(board: Board, rules: Rules) -> None:
-    """Chi-square of 20,000 draws with a fixed seed stays within four standard deviations of its mean."""
+    """Chi-square of 20,000 samples with a fixed seed is within four standard deviations of its mean."""
     draws = 20_000
     state, scores = reset(board), scores_of(board, 3)
     expected = chances(board, state, scores, rules)
@@ -151,7 +151,7 @@ def test_sample_frequencies_match_probabilities(board: Board, rules: Rules) -> N
 
 @pytest.mark.parametrize("temperature", [0.5, 2.0])
 def test_temperature_divides_the_scores(board: Board, temperature: float) -> None:
-    """A draw at a temperature is the draw at 1 with scores divided by it."""
+    """Sampling at a temperature equals sampling at 1 with scores divided by it."""
     state, scores = reset(board), scores_of(board)
     other = Scores(scores.bids / temperature, scores.reserve / temperature, scores.value)
     for rules in (PLANNING, AT_ONCE):
@@ -164,7 +164,7 @@ def test_temperature_divides_the_scores(board: Board, temperature: float) -> Non
 
 @pytest.mark.parametrize("seed", range(5))
 def test_zero_temperature_takes_the_best_action(board: Board, seed: int) -> None:
-    """At temperature 0 bids are granted from the best down; agents that choose at once each take their best."""
+    """At temperature 0 bids are granted in decreasing order; with simultaneous choices each agent takes its best."""
     state, scores = reset(board), scores_of(board, seed)
     _, n, c = board.shape
     expected: list[int] = []
@@ -191,7 +191,7 @@ def test_zero_temperature_takes_the_best_action(board: Board, seed: int) -> None
 def test_sampled_actions_have_finite_log_probabilities(
     instance: Instance, seed: int, rules: Rules, spread: float
 ) -> None:
-    """Every sampled action, in games that go on or have ended, has a finite log-probability, never above 0."""
+    """Every sampled action of running and ended games has a finite log-probability of at most 0."""
     board = layout(instance, instance, instance)
     state, generator = reset(board), torch.Generator().manual_seed(seed)
     state.done[1] = True
@@ -208,7 +208,7 @@ def test_sampled_actions_have_finite_log_probabilities(
 
 
 def test_entropy_matches_plain_python(board: Board) -> None:
-    """Entropy is that of the first draw of a round, and that of the mean agent where all choose at once."""
+    """Entropy is that of the first grant of a round, or the mean over agents with simultaneous choices."""
     state, scores = reset(board), scores_of(board)
     first = rounds(board, state, scores, 1).values()
     actions, _ = sample_actions(board, state, scores)
@@ -220,7 +220,7 @@ def test_entropy_matches_plain_python(board: Board) -> None:
 
 
 def test_log_probabilities_have_gradients(board: Board) -> None:
-    """Raising the score of what was granted raises its probability, and barred bids are given no gradient."""
+    """Raising the score of a granted bid raises its probability; masked bids have no gradient."""
     scores = scores_of(board)
     bids, reserve = scores.bids.clone().requires_grad_(), scores.reserve.clone().requires_grad_()
     actions, _ = sample_actions(board, reset(board), scores, PLANNING, 1.0, torch.Generator().manual_seed(0))

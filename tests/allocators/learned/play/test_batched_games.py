@@ -26,7 +26,7 @@ def games_on(board: Board, copies: int = 1) -> Games:
 @pytest.mark.parametrize("total", [True, False])
 @pytest.mark.parametrize("name", BOARDS)
 def test_compiled_games_match_torch(name: str, total: bool, attention: bool) -> None:
-    """Played greedily, every game ends in the same best position, to single precision."""
+    """Played greedily, every game ends in the same best position, within single precision."""
     board = BOARDS[name]()
     torch.manual_seed(3)
     network = ActorCritic(NetworkSize(attention=attention)).eval().requires_grad_(False)
@@ -39,7 +39,7 @@ def test_compiled_games_match_torch(name: str, total: bool, attention: bool) -> 
 
 
 def test_sampled_games_are_legal_and_reproducible() -> None:
-    """Drawn games keep to reach, differ from each other, and are the same again by the same seed."""
+    """Sampled games respect reach, differ from each other, and are reproducible by seed."""
     board = BOARDS["ranged"]()
     torch.manual_seed(3)
     network = ActorCritic().eval().requires_grad_(False)
@@ -53,7 +53,7 @@ def test_sampled_games_are_legal_and_reproducible() -> None:
 
 
 def test_stop_request_ends_play_with_a_position() -> None:
-    """When it is time to stop, the first game still has a position, and those not begun are infinitely bad."""
+    """At a stop request the first game has a position, and games not yet started count as infinitely bad."""
     board = layout(*(paper_like(20, 4, 80, seed) for seed in range(3)))
     network = ActorCritic().eval().requires_grad_(False)
     best = play_games(network, board, games_on(board), rounds=5, should_stop=lambda: True)
@@ -62,7 +62,7 @@ def test_stop_request_ends_play_with_a_position() -> None:
 
 
 def test_weights_and_arrays_keep_their_values() -> None:
-    """Weights come with the bias as last row, and game arrays share the numbers of the board."""
+    """The last row of the weights is the bias, and game arrays share the numbers of the board."""
     network = ActorCritic()
     weights = weights_of(network)
     assert np.allclose(weights.local1[:-1].T, network.local[0].weight.detach().numpy())

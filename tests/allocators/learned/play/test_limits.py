@@ -31,7 +31,7 @@ def sized(agents: int, tasks: int) -> Instance:
 def test_size_limits_depend_on_time_and_memory(
     agents: int, tasks: int, limit: float | None, reason: str | None
 ) -> None:
-    """Small ones are never refused; large ones are where the time is short or memory is, with the limit named."""
+    """Small instances are never refused; large ones are if time or memory is short, with the limit in the reason."""
     said = too_large(sized(agents, tasks), Budget(time_limit_s=limit, iterations=1))
     if reason is None:
         assert said is None

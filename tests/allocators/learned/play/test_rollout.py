@@ -82,7 +82,7 @@ def assert_scored_anew(network: ActorCritic, scores: LocalScores, board: Board, 
 def test_incremental_scores_match_full_scores(
     board: Board, network: ActorCritic, rules: Rules, anew: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """After every step of random play all open bids are scored as if anew, while games end and are dropped."""
+    """After every step of random play all open bids equal those scored anew, while games end and are dropped."""
     monkeypatch.setattr(rollout, "RESCORE_ALL", anew)
     generator, state = torch.Generator().manual_seed(0), reset(board)
     scores = LocalScores(network, board, state, lambda: False)
@@ -98,7 +98,7 @@ def test_incremental_scores_match_full_scores(
 
 
 def test_scores_do_not_depend_on_chunks(board: Board, network: ActorCritic, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Scored a few agents at a time, the first scores are the same, and a wish to stop is heard in between."""
+    """Scored in chunks of agents, the first scores are the same, and stop requests are checked in between."""
     state = reset(board)
     monkeypatch.setattr(rollout, "SCORE_CHUNK", 100)
     chunked = LocalScores(network, board, state, lambda: False).local
@@ -114,7 +114,7 @@ def rank(score: Evaluation, hours: float = 1.0) -> tuple[int, float, float]:
 
 
 def test_best_position_matches_the_evaluator(network: ActorCritic) -> None:
-    """The best position on the way, each scored by `evaluate`, is the one that `play` returns."""
+    """`play` returns the best of all positions as scored by `evaluate`."""
     instances = [paper_like(12, 4, 50, seed) for seed in range(5)]
     board = layout(*instances)
     best = play(network, board, steps=20, temperature=1.0, generator=torch.Generator().manual_seed(2))
@@ -145,7 +145,7 @@ def test_best_position_matches_the_evaluator(network: ActorCritic) -> None:
 
 
 def test_batched_games_end_as_single_ones(board: Board, network: ActorCritic) -> None:
-    """Games of different lengths, dropped as they end, find the positions that each finds alone."""
+    """Games of different lengths, dropped as they end, find the same positions as single games."""
     energy_weights = torch.tensor([0.0, 0.5, 2.0, 8.0])
     board = replace(board, energy_weight=energy_weights)
     together = play(network, board, steps=30)
@@ -168,14 +168,14 @@ def test_never_worse_than_the_start(board: Board, network: ActorCritic, total: b
 
 
 def test_zero_steps_return_the_start(board: Board) -> None:
-    """Without a step the beginning comes back."""
+    """Without a step the initial position is returned."""
     start = play(ActorCritic(NetworkSize(8, 8, 2)), board, steps=0)
     assert torch.equal(start.slot, board.start)
     assert torch.equal(start.distance, position(board, reset(board)).distance)
 
 
 def test_total_and_maximum_shortfall_match_hand_calculation() -> None:
-    """Needs of 4 and 2 with groups of 3 and 3: the shortfall is a quarter at the worst task, a sixth in total."""
+    """Needs 4 and 2, groups of 3 and 3: the largest relative shortfall is a quarter, the total a sixth."""
     instance = Instance(ability=[3, 3], workload=[4, 2])
     board = replace(layout(instance), start=torch.tensor([[0, 1]]))
     worst, total = (position(board, reset(board), total).shortfall.item() for total in (False, True))
@@ -183,7 +183,7 @@ def test_total_and_maximum_shortfall_match_hand_calculation() -> None:
 
 
 def test_comparison_of_positions_is_lexicographic() -> None:
-    """Fewer unserved come first, then less shortfall, then nearer; what single precision cannot tell is equal."""
+    """Fewer unserved, then less shortfall, then less distance; differences within single precision are ties."""
 
     def best(unserved: int, shortfall: float, distance: float) -> Best:
         return Best(torch.zeros(1, 1), *(torch.tensor([float(value)]) for value in (unserved, shortfall, distance)))
@@ -196,7 +196,7 @@ def test_comparison_of_positions_is_lexicographic() -> None:
 
 
 def test_play_stops_on_request(board: Board, network: ActorCritic) -> None:
-    """Told so at once, the beginning comes back; told so later, as many steps as were asked for have been made."""
+    """Stopped at once, it returns the initial position; stopped later, it has made the steps before the request."""
     assert torch.equal(play(network, board, steps=30, should_stop=lambda: True).slot, board.start)
     asked: list[int] = []
 

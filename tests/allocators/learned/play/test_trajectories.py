@@ -72,7 +72,7 @@ def test_advantages_match_hand_calculation() -> None:
 
 @pytest.mark.parametrize("gae_lambda", [0.0, 0.8, 1.0])
 def test_advantages_match_the_definition(gae_lambda: float) -> None:
-    """Games of all lengths side by side: those that end, and one that is cut off and counts its last value."""
+    """Batched games of all lengths: some that end, and one that is truncated and bootstrapped."""
     generator = torch.Generator().manual_seed(0)
     steps = 6
     reward, value = torch.randn(2, steps, steps, generator=generator).unbind()
@@ -91,7 +91,7 @@ def test_advantages_match_the_definition(gae_lambda: float) -> None:
 
 
 def test_no_return_beyond_the_end_of_a_game() -> None:
-    """The step that ends a game sees neither later rewards nor later values."""
+    """The step that ends a game is not affected by later rewards or values."""
     reward = torch.tensor([[1.0], [2.0], [99.0]])
     value = torch.tensor([[0.5], [0.25], [77.0]])
     alive = torch.tensor([[True], [True], [False]])
@@ -100,7 +100,7 @@ def test_no_return_beyond_the_end_of_a_game() -> None:
 
 
 def test_traces_are_truncated_as_in_v_trace() -> None:
-    """Value and cut advantage make V-trace's target v_s (Espeholt et al. 2018, (1)), with rho and c cut at 1."""
+    """Value plus advantage is V-trace's target v_s (Espeholt et al. 2018, (1)), with rho and c truncated at 1."""
     generator = torch.Generator().manual_seed(1)
     reward, value = torch.randn(2, 5, 1, generator=generator).unbind()
     importance_ratio = torch.tensor([0.5, 3.0, 0.2, 1.0, 0.7])[:, None]
@@ -116,14 +116,14 @@ def test_traces_are_truncated_as_in_v_trace() -> None:
 
 @pytest.mark.parametrize("rules", ALL_RULES.values(), ids=list(ALL_RULES))
 def test_rewards_sum_to_the_increase_of_utility(board: Board, network: ActorCritic, rules: Rules) -> None:
-    """The recorded actions lead to a state that is utility more by the rewards."""
+    """The recorded actions increase the utility by the sum of the rewards."""
     played = play(network, board, 5, rules)
     rise = utility(board, next_state(played, rules), rules) - utility(board, reset(board), rules)
     torch.testing.assert_close(played.reward.sum(0), 5 * rise, atol=1e-4, rtol=1e-4)
 
 
 def test_increase_of_utility_matches_the_evaluator(network: ActorCritic) -> None:
-    """With energy alone, the reward of a game is the distance saved, as the one scorer measures it."""
+    """With energy alone, the reward of a game is the distance saved, as measured by the evaluator."""
     instance = paper_like(8, 3, 36, 0)
     board = layout(instance, hours=1e6, energy_weight=2.0)  # needs of next to nothing: all but energy is met
     played = play(network, board, 4)
@@ -136,7 +136,7 @@ def test_increase_of_utility_matches_the_evaluator(network: ActorCritic) -> None
 
 @pytest.mark.parametrize("rules", ALL_RULES.values(), ids=list(ALL_RULES))
 def test_values_and_probabilities_match_the_network(board: Board, network: ActorCritic, rules: Rules) -> None:
-    """Asked again about the recorded states, the network says what was recorded."""
+    """Evaluated again on the recorded states, the network gives the recorded outputs."""
     played = play(network, board, 5, rules)
     for t, actions in enumerate(played.actions):
         state = played.state[torch.tensor(t)]
@@ -148,7 +148,7 @@ def test_values_and_probabilities_match_the_network(board: Board, network: Actor
 
 
 def test_truncated_game_is_bootstrapped(board: Board, network: ActorCritic) -> None:
-    """After one step the network's value stands for the rest, but for games that have ended."""
+    """After one step the network's value stands for the rest, except in games that have ended."""
     with torch.no_grad():
         network.reserve[-1].bias.fill_(3.0)  # as likely as some 20 bids: about every other game stops at once
     played = play(network, board, 1, seed=3)
@@ -160,7 +160,7 @@ def test_truncated_game_is_bootstrapped(board: Board, network: ActorCritic) -> N
 
 
 def test_ended_games_are_not_counted(board: Board, network: ActorCritic) -> None:
-    """Decisions and evaluations are those of games still on, and nothing happens in the others."""
+    """Decisions and evaluations count only running games, and ended games do not change."""
     played = play(network, board, 50)
     assert bool(next_state(played, PLANNING).done.all())
     assert not bool(played.alive.all())
@@ -175,7 +175,7 @@ def test_ended_games_are_not_counted(board: Board, network: ActorCritic) -> None
 
 
 def test_play_continues_from_a_state(board: Board, network: ActorCritic) -> None:
-    """Two segments with one generator are one long game."""
+    """Two segments with one generator equal one long game."""
     one, generator = play(network, board, 4), torch.Generator().manual_seed(0)
     first = collect(network, board, 2, generator, reward_scale=5.0)
     second = collect(network, board, 2, generator, reward_scale=5.0, state=next_state(first, PLANNING))
@@ -185,7 +185,7 @@ def test_play_continues_from_a_state(board: Board, network: ActorCritic) -> None
 
 
 def test_same_generator_plays_the_same_games(board: Board, network: ActorCritic) -> None:
-    """The same generator plays the same games, whatever torch's own generator says; another plays others."""
+    """Games depend on the given generator and not on torch's global one."""
     one, other = play(network, board, 4), play(network, board, 4, seed=1)
     torch.manual_seed(999)
     again = play(network, board, 4)

@@ -49,13 +49,13 @@ def test_transitions_form_a_path_of_single_moves(board: Board, rules: Rules) -> 
 
 
 def test_simultaneous_choices_are_refused(board: Board) -> None:
-    """What one agent brings is not defined where all choose at once, and the error says so."""
+    """The contribution of one agent is undefined with simultaneous choices, and the error says so."""
     with pytest.raises(InputError, match="bidding"):
         played(board, Rules(turn=TurnRule.SIMULTANEOUS))
 
 
 def test_exploration_never_stops_at_once(board: Board) -> None:
-    """A network that would stop at once explores all the same."""
+    """A network that would stop at once still explores."""
     network = ActorCritic()
     with torch.no_grad():
         network.reserve[-1].bias += 100.0
@@ -65,7 +65,7 @@ def test_exploration_never_stops_at_once(board: Board) -> None:
 
 
 def test_gains_are_scores_minus_the_reserve(board: Board) -> None:
-    """Closed bids have none, and stopping has 0."""
+    """Closed bids have no gain, and stopping has gain 0."""
     state = reset(board)
     bids, reserve = torch.full(board.shape, 3.0), torch.tensor([1.0, 2.0, 5.0])
     got = scores_above_reserve(bids, reserve, board, state, PLANNING)
@@ -76,7 +76,7 @@ def test_gains_are_scores_minus_the_reserve(board: Board) -> None:
 
 
 def test_oldest_board_is_dropped_first(board: Board) -> None:
-    """No more than the capacity is kept, and what was kept last is there."""
+    """The capacity is never exceeded, and the latest board is kept."""
     first, second = played(board, steps=1), played(board, steps=2)
     memory = TransitionMemory(len(first.action) + len(second.action) - 1)
     memory.add(first)
@@ -85,7 +85,7 @@ def test_oldest_board_is_dropped_first(board: Board) -> None:
 
 
 def test_transitions_are_drawn_uniformly(board: Board) -> None:
-    """Whatever the sizes of the boards, each transition has the same chance."""
+    """Each transition is equally likely, whatever the sizes of the boards."""
     small = played(board, steps=1)
     large = played(probe("pairing").board, steps=1)
     memory, generator = TransitionMemory(10_000), torch.Generator().manual_seed(0)

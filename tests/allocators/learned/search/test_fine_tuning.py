@@ -53,7 +53,7 @@ def weights(networks: list[ActorCritic]) -> torch.Tensor:
 def test_fine_tuning_starts_and_ends_in_its_share_of_time(
     networks: list[ActorCritic], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Not before three seconds, then until its share of the time is spent; never where runs must repeat."""
+    """It starts after three seconds, takes its share of the time, and never runs with iteration limits."""
     clock = [0.0]
     monkeypatch.setattr(Search, "elapsed_s", property(lambda self: clock[0]))
     tuning = FineTuning(search(), networks)
@@ -65,7 +65,7 @@ def test_fine_tuning_starts_and_ends_in_its_share_of_time(
 
 
 def test_shipped_networks_are_not_modified(networks: list[ActorCritic], regions: Regions) -> None:
-    """Lessons change copies, member by member; the networks of the policy serve the next run as before."""
+    """Updates change copies of each member; the policy's networks serve the next run unchanged."""
     before = weights(networks).clone()
     tuning = FineTuning(search(), networks, FEW)
     once = weights(list(tuning.learn(regions))).clone()
@@ -79,7 +79,7 @@ def test_shipped_networks_are_not_modified(networks: list[ActorCritic], regions:
 
 
 def test_population_breeds_after_enough_jobs(networks: list[ActorCritic], regions: Regions) -> None:
-    """After some lessons of each member the population breeds; all weights stay finite, and the seed decides."""
+    """After some jobs of each member the population is bred; weights stay finite and depend on the seed."""
     ends = []
     for seed in (0, 0, 1):
         tuning = FineTuning(search(seed=seed), networks, FEW)
@@ -94,7 +94,7 @@ def test_population_breeds_after_enough_jobs(networks: list[ActorCritic], region
 
 @pytest.mark.parametrize("rewards", list(permutations((1.0, 2.0, 3.0))))
 def test_elite_survives_a_generation(regions: Regions, rewards: tuple[float, ...]) -> None:
-    """Whatever the order of their fitness, the elite pass unchanged, weights and optimiser together."""
+    """In any order of fitness, the elite passes unchanged, with weights and optimiser."""
     torch.manual_seed(0)
     shipped = [ActorCritic(NetworkSize(8, 8, 2)).requires_grad_(False) for _ in rewards]
     tuning = FineTuning(search(), shipped, FEW)
@@ -116,7 +116,7 @@ def moments(member: Ppo) -> torch.Tensor:
 
 
 def test_games_start_at_the_nearest_task_or_in_the_plan(regions: Regions) -> None:
-    """Some agents begin at the nearest task, others where the plan has them, with energy weights in the range."""
+    """Some agents start at the nearest task, others in the plan, with energy weights in the range."""
     games = _RegionGames(regions, FineTuningParameters(games=200))
     board = games.draw(np.random.default_rng(0), 0.0)
     assert board.shape[0] == 200
@@ -132,7 +132,7 @@ def test_games_start_at_the_nearest_task_or_in_the_plan(regions: Regions) -> Non
 
 
 def test_planner_uses_fine_tuned_networks(networks: list[ActorCritic], monkeypatch: pytest.MonkeyPatch) -> None:
-    """Where learning is due, the planner's networks are those that learned."""
+    """After fine-tuning, the planner plays with the updated networks."""
     run = search(None, 3)
     tuning = FineTuning(run, networks, FEW)
     monkeypatch.setattr(tuning, "is_due", lambda: True)

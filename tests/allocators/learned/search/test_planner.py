@@ -68,7 +68,7 @@ def solved(
 
 
 def test_regions_contain_all_agents_of_their_tasks(network: ActorCritic) -> None:
-    """Each region has the agents of its tasks and some of the idle; nobody is in two."""
+    """Each region has the agents of its tasks and some idle ones; no agent is in two regions."""
     instance = paper_like(40, 9, 170, 1)
     one = planner(network, instance)
     one.plan = np.random.default_rng(0).integers(-1, 9, 40)
@@ -83,7 +83,7 @@ def test_regions_contain_all_agents_of_their_tasks(network: ActorCritic) -> None
 
 
 def test_sweep_moves_only_agents_of_accepted_regions(network: ActorCritic) -> None:
-    """Agents of regions that were not accepted, and those in no region, stay where they are."""
+    """Agents of rejected regions, and those in no region, stay where they are."""
     instance = paper_like(40, 9, 170, 1)
     one = planner(network, instance)
     one.plan = instance.start_task.copy()
@@ -100,7 +100,7 @@ def test_sweep_moves_only_agents_of_accepted_regions(network: ActorCritic) -> No
 
 
 def test_accepted_plans_have_less_shortfall(network: ActorCritic) -> None:
-    """Every merged plan has less shortfall in total, or as much at less distance."""
+    """Every merged plan has less total shortfall, or the same with less distance."""
     instance = paper_like(40, 9, 170, 1)
     one = planner(network, instance)
     one.play_whole(1.0)
@@ -118,7 +118,7 @@ def test_accepted_plans_have_less_shortfall(network: ActorCritic) -> None:
 
 @pytest.mark.parametrize("objective", OBJECTIVES)
 def test_never_worse_than_the_start(network: ActorCritic, objective: Objective) -> None:
-    """Whatever it begins from, what comes back is as good, and each improvement is better than the one before."""
+    """The result is at least as good as the start, and each improvement is better than the previous one."""
     instance = paper_like(30, 6, 130, 2)
     start = Allocation(np.arange(30) % 6)
     search = planned(network, instance, objective=objective, start=start)
@@ -130,7 +130,7 @@ def test_never_worse_than_the_start(network: ActorCritic, objective: Objective) 
 
 @pytest.mark.parametrize("seed", range(30))
 def test_tiny_instances_are_feasible_and_above_the_optimum(network: ActorCritic, seed: int) -> None:
-    """On instances of every kind the plan is allowed, serves all that can be served, and is not below the optimum."""
+    """On tiny instances plans are feasible, serve all servable tasks, and are not below the optimum."""
     instance = tiny_instance(seed)
     search = planned(network, instance, objective=ENERGY, iterations=2)
     best = brute_force(instance)
@@ -142,7 +142,7 @@ def test_tiny_instances_are_feasible_and_above_the_optimum(network: ActorCritic,
 
 
 def test_most_tiny_instances_are_solved(network: ActorCritic) -> None:
-    """Even with an untrained network, games on regions find the least makespan of four in five."""
+    """Even with an untrained network, games on regions find the least makespan of four in five instances."""
     hit = 0
     for seed in range(20):
         instance = tiny_instance(seed)
@@ -153,7 +153,7 @@ def test_most_tiny_instances_are_solved(network: ActorCritic) -> None:
 
 
 def test_targets_start_at_the_bound_and_are_bisected(network: ActorCritic) -> None:
-    """Targets: the bound; without progress, halfway to the makespan reached; nearer the bound when one is reached."""
+    """First the bound; without progress, halfway to the best makespan; after success, nearer to the bound."""
     instance = Instance(ability=[3, 3, 3], workload=[4, 5])  # the bound of 1 cannot be met: 5 / 3 or 4 / 3 at best
     one = planner(network, instance)
     bound = one.target.hours
@@ -176,7 +176,7 @@ def test_targets_start_at_the_bound_and_are_bisected(network: ActorCritic) -> No
 
 
 def test_energy_counts_at_the_bound_or_late_in_the_run(network: ActorCritic) -> None:
-    """With energy in the objective the target becomes the makespan reached, at the bound, or late in the run."""
+    """With energy in the objective, the target becomes the best makespan at the bound or late in the run."""
     instance = Instance(ability=[3, 3, 3], workload=[4, 5])
     early, late = (planner(network, instance, ENERGY, iterations=10) for _ in range(2))
     late.search.iteration = 7
@@ -192,7 +192,7 @@ def test_energy_counts_at_the_bound_or_late_in_the_run(network: ActorCritic) -> 
 
 
 def test_optimum_is_found_with_an_unreachable_bound(network: ActorCritic) -> None:
-    """Where the bound is out of reach, bisection on the target finds the optimum all the same."""
+    """If the bound cannot be reached, bisection of the target still finds the optimum."""
     instance = Instance(ability=[5, 5, 5, 4, 4], workload=[9, 8, 6], agent_position=np.zeros((5, 2)))
     best = brute_force(instance)
     one = planner(network, instance, iterations=12)
@@ -204,7 +204,7 @@ def test_optimum_is_found_with_an_unreachable_bound(network: ActorCritic) -> Non
 
 
 def test_unservable_tasks_do_not_count(network: ActorCritic) -> None:
-    """A huge task out of reach, and more tasks than agents, spoil neither bound nor search."""
+    """A huge task out of reach, or more tasks than agents, affects neither bound nor search."""
     far = Instance(
         ability=[1] * 10,
         workload=[6, 4, 90],
@@ -220,7 +220,7 @@ def test_unservable_tasks_do_not_count(network: ActorCritic) -> None:
 
 @pytest.mark.parametrize("seed", range(6))
 def test_smallest_tasks_are_served_in_a_shortage(network: ActorCritic, seed: int) -> None:
-    """With more tasks than agents everywhere in reach, the makespan is that of brute force."""
+    """With more tasks than agents and complete reach, the makespan equals brute force."""
     rng = np.random.default_rng(seed)
     instance = Instance(ability=rng.integers(1, 6, 3), workload=rng.integers(1, 30, 5))
     got, best = solved(network, instance, iterations=10), brute_force(instance)
@@ -228,7 +228,7 @@ def test_smallest_tasks_are_served_in_a_shortage(network: ActorCritic, seed: int
 
 
 def test_task_that_needs_most_agents_gets_them_in_the_first_game(network: ActorCritic) -> None:
-    """One agent joins a task in a round: a game goes on as long as the largest task takes."""
+    """One agent per round joins a task: games last as long as the largest task needs."""
     instance = Instance(ability=np.ones(60), workload=[48.0, *[2.0] * 6], start_task=np.arange(60) % 7)
     one = planner(network, instance)
     board = make_board([instance], [1.0], [1.0], np.random.default_rng(0))
@@ -247,7 +247,7 @@ def test_task_that_needs_most_agents_gets_them_in_the_first_game(network: ActorC
 def test_games_on_a_region_are_bounded(
     network: ActorCritic, monkeypatch: pytest.MonkeyPatch, pairs: int, most: int, games: int
 ) -> None:
-    """Each region is played once at least, and no more often than is allowed, however many pairs may be."""
+    """Each region is played at least once, and at most as often as allowed, however many pairs there may be."""
     instance = paper_like(60, 20, 330, 3)
     one = Planner(
         Search(instance, ENERGY, Budget(None, 4)),
@@ -268,7 +268,7 @@ def test_games_on_a_region_are_bounded(
 
 
 def test_targets_approached_too_slowly_are_abandoned(network: ActorCritic) -> None:
-    """A target is given up for one halfway where, after a share of the budget, most of the shortfall is left."""
+    """If most of the shortfall is left after a share of the budget, the target is bisected."""
     instance = paper_like(40, 8, 170, 0)
     one = planner(network, instance, iterations=100)
     one.play_whole(1.0)
@@ -289,7 +289,7 @@ def test_targets_approached_too_slowly_are_abandoned(network: ActorCritic) -> No
 
 
 def test_small_shortfall_does_not_end_a_target(network: ActorCritic) -> None:
-    """A shortfall of less than a mean ability ends no target, and stagnation is counted after some sweeps only."""
+    """A shortfall below the mean ability ends no target, and stagnation counts only after some sweeps."""
     one = planner(network, paper_like(40, 8, 170, 0), iterations=100)
     one.play_whole(1.0)
     target, first = one.target, one.target.hours
@@ -306,7 +306,7 @@ def test_small_shortfall_does_not_end_a_target(network: ActorCritic) -> None:
 
 
 def test_small_shortfalls_of_many_tasks_end_a_target(network: ActorCritic) -> None:
-    """Where many tasks are short, a target is given up however small the total: it may be out of reach."""
+    """If many tasks are short, a target is abandoned even at a small total, as it may be infeasible."""
     one = planner(network, paper_like(40, 8, 170, 0), iterations=100)
     one.play_whole(1.0)
     target, slow = one.target, []
@@ -321,7 +321,7 @@ def test_small_shortfalls_of_many_tasks_end_a_target(network: ActorCritic) -> No
 
 
 def test_run_without_work_ends_at_once(network: ActorCritic) -> None:
-    """Where there is no work there is an answer, and no game on regions."""
+    """Without work there is an answer, and no game on regions."""
     instance = Instance(ability=[1, 1], workload=[0], agent_position=[[0, 0]] * 2, task_position=[[9, 9]])
     search = planned(network, instance, iterations=None, time_limit_s=60.0)
     assert search.best is not None
@@ -329,7 +329,7 @@ def test_run_without_work_ends_at_once(network: ActorCritic) -> None:
 
 
 def test_slack_and_limit_save_energy(network: ActorCritic) -> None:
-    """The more time a plan may take, the less it flies; a limit that is given is the target."""
+    """More time for a plan means less flying; a given limit is the target."""
     instance = paper_like(24, 5, 100, 3)
     spent = []
     for tolerance in (MakespanTolerance(), MakespanTolerance(slack=0.3), MakespanTolerance(limit=3.0)):
@@ -345,7 +345,7 @@ def test_slack_and_limit_save_energy(network: ActorCritic) -> None:
 
 @pytest.mark.parametrize("objective", OBJECTIVES)
 def test_same_seed_gives_same_answer(network: ActorCritic, objective: Objective) -> None:
-    """Counted in sweeps, answers agree move by move with one thread and with two; another seed's differ."""
+    """With a sweep budget, answers are identical with one thread and with two; those of another seed differ."""
     instance = random_instance(Family(agents=24, tasks=5, starts="own", speed=(0.5, 2.0)), 1)
     runs = [planned(network, instance, objective=objective, threads=threads, seed=4) for threads in (1, 1, 2)]
     other = planned(network, instance, objective=objective, seed=5)
@@ -355,7 +355,7 @@ def test_same_seed_gives_same_answer(network: ActorCritic, objective: Objective)
 
 
 def test_planner_stops_in_time(network: ActorCritic) -> None:
-    """Sweeps and the games in them end when time is up; with no time at all there is still an answer."""
+    """Sweeps and their games end when time is up; even with zero time there is an answer."""
     instance = paper_like(100, 20, 400, 0)
     for limit in (0.0, 0.5):
         one = planner(network, instance, ENERGY, iterations=None, time_limit_s=limit)
@@ -369,14 +369,14 @@ def test_planner_stops_in_time(network: ActorCritic) -> None:
 @pytest.mark.parametrize("objective", OBJECTIVES)
 @pytest.mark.parametrize("name", list(EXTREMES))
 def test_extreme_instances_give_feasible_plans(network: ActorCritic, name: str, objective: Objective) -> None:
-    """Huge and tiny numbers, no positions, nobody able, nothing to do: there is an allowed answer."""
+    """Huge and tiny numbers, no positions, no able agent, no work: the plan is feasible."""
     search = planned(network, EXTREMES[name], objective=objective)
     assert search.best is not None
     assert search.best.evaluation.violations == ()
 
 
 def test_idle_agents_are_assigned(network: ActorCritic) -> None:
-    """Agents that begin idle, or are left idle by a start, join where they are needed."""
+    """Agents that start idle, or are left idle by a start, join tasks that need them."""
     instance = Instance(ability=np.ones(12), workload=np.full(3, 4.0), task_position=np.eye(3))
     start = Allocation(np.array([0, 1, 2, *[IDLE] * 9]))
     search = planned(network, instance, start=start, iterations=8)
@@ -385,7 +385,7 @@ def test_idle_agents_are_assigned(network: ActorCritic) -> None:
 
 
 def test_all_networks_are_used(network: ActorCritic, monkeypatch: pytest.MonkeyPatch) -> None:
-    """All networks of a policy play games on regions, the first one the game on the whole instance."""
+    """All networks of a policy play on regions, the first one on the whole instance."""
     networks = [network, *(copy.deepcopy(network) for _ in range(2))]
     asked: list[int] = []
 
@@ -402,7 +402,7 @@ def test_all_networks_are_used(network: ActorCritic, monkeypatch: pytest.MonkeyP
 
 
 def test_target_allows_for_flights_with_finite_speeds() -> None:
-    """Two agents of 1 per hour fly 1 h and 3 h to work of 2 in all: divided without remainder, it ends after 3 h."""
+    """Two agents of ability 1 fly 1 h and 3 h to work of 2 in total, which they finish after 3 h."""
     instance = Instance(
         ability=[1.0, 1.0],
         workload=[1.0, 1.0],

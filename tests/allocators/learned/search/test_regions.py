@@ -11,7 +11,7 @@ from alloc.problems.game.candidates import candidate_tasks
 
 @pytest.mark.parametrize("seed", range(20))
 def test_tasks_are_partitioned(seed: int) -> None:
-    """Regions are of one size and share no task; fewer tasks than a region are left over."""
+    """Regions are disjoint and of one size; fewer tasks than a region remain."""
     rng = np.random.default_rng(seed)
     m, size = int(rng.integers(1, 30)), int(rng.integers(1, 6))
     size = min(size, m)
@@ -22,7 +22,7 @@ def test_tasks_are_partitioned(seed: int) -> None:
 
 @pytest.mark.parametrize("seed", range(20))
 def test_regions_are_built_around_shortfalls(seed: int) -> None:
-    """Where there are shortfalls, each region has one, and a surplus while there is any left."""
+    """With shortfalls, each region has one, and a surplus as long as there are any."""
     rng = np.random.default_rng(seed)
     m, size = int(rng.integers(4, 30)), int(rng.integers(2, 5))
     surplus = rng.integers(-3, 4, m).astype(float)
@@ -38,7 +38,7 @@ def test_regions_are_built_around_shortfalls(seed: int) -> None:
 
 
 def test_shortfall_and_surplus_are_in_one_region() -> None:
-    """A region has the nearest tasks with a surplus, however far, and no more of them than are needed."""
+    """A region has the nearest tasks with a surplus, however far, and no more of them than needed."""
     place = np.arange(10.0)[:, None] * [1.0, 0.0, 0.0]
     surplus = np.zeros(10)
     surplus[[0, 7, 8, 9]] = [-2.5, 2.0, 1.0, 5.0]
@@ -50,7 +50,7 @@ def test_shortfall_and_surplus_are_in_one_region() -> None:
 
 
 def test_regions_contain_nearby_tasks() -> None:
-    """Two far clusters of four are never mixed."""
+    """Two distant clusters of four tasks are never mixed."""
     place = np.repeat([[0.0, 0, 0], [9.0, 0, 0]], 4, axis=0) + 0.1 * np.random.default_rng(0).random((8, 3))
     for seed in range(20):
         regions = partition(place, np.zeros(8), 4, np.random.default_rng(seed))
@@ -59,7 +59,7 @@ def test_regions_contain_nearby_tasks() -> None:
 
 @pytest.mark.parametrize("scale", [1e-300, 1e60])
 def test_regions_are_disjoint_for_any_positions(scale: float) -> None:
-    """Unknown, huge and tiny positions make regions that share no task."""
+    """Unknown, huge and tiny positions give disjoint regions."""
     rng = np.random.default_rng(0)
     place = scale * rng.uniform(-1, 1, (12, 3))
     place[3] = np.nan
@@ -75,7 +75,7 @@ def edges(*pairs: tuple[int, int], m: int) -> scipy.sparse.csr_array:
 
 @pytest.mark.parametrize("size", [2, 3, 4, 5])
 def test_regions_follow_paths_to_a_surplus(size: int) -> None:
-    """The nearest surplus in space cannot come; one that can over other tasks brings these along, if there is room."""
+    """If the nearest surplus is out of reach, one reachable via other tasks brings these along if there is room."""
     place = np.arange(6.0)[:, None] * [1.0, 0.0, 0.0]
     surplus = np.array([-1.0, 4.0, 0.0, 0.0, 0.0, 2.0])
     graph = edges((0, 3), (3, 4), (4, 5), (5, 0), (2, 1), m=6)
@@ -86,7 +86,7 @@ def test_regions_follow_paths_to_a_surplus(size: int) -> None:
 
 
 def test_regions_share_no_task_of_a_path() -> None:
-    """Two shortfalls with one path for both: no task is in two regions."""
+    """If two shortfalls have the same path, no task is in two regions."""
     graph = edges((0, 1), (2, 1), (1, 3), m=4)
     for seed in range(20):
         regions = partition(
@@ -96,7 +96,7 @@ def test_regions_share_no_task_of_a_path() -> None:
 
 
 def test_graph_is_used_only_for_shortfalls() -> None:
-    """Without a shortfall, and for tasks without edges, regions are of neighbours in space."""
+    """Without a shortfall or edges, regions consist of spatial neighbours."""
     place = np.repeat([[0.0, 0, 0], [9.0, 0, 0]], 2, axis=0)
     graph = edges((0, 3), (3, 0), (1, 2), (2, 1), m=4)
     regions = partition(place, np.zeros(4), 2, np.random.default_rng(0), graph=graph)
@@ -106,7 +106,7 @@ def test_graph_is_used_only_for_shortfalls() -> None:
 
 
 def test_edges_lead_to_agents_that_can_take_the_task() -> None:
-    """An edge leads from a task to those with an agent that may work at it; agents that are idle or there make none."""
+    """Edges lead to tasks whose agents can also take this one; idle agents and those of the task itself have none."""
     instance = Instance(
         ability=[1, 1, 1, 1],
         workload=[1, 1, 1],

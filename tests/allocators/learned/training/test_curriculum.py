@@ -22,7 +22,7 @@ def drawn(curriculum: Curriculum, seed: int = 0, progress: float = 1.0) -> Board
 
 @pytest.mark.parametrize("family", FAMILIES)
 def test_every_family_gives_playable_games(family: str) -> None:
-    """Whatever is drawn is finite, needs something, and lets somebody move."""
+    """All numbers are finite, some task needs work, and some agent can move."""
     for seed in range(3):
         board = drawn(replace(SMALL, families=(family,)), seed)
         for field in fields(Board):
@@ -40,7 +40,7 @@ def test_same_generator_draws_the_same_games() -> None:
 
 
 def test_sizes_grow_with_progress() -> None:
-    """Boards have the tasks of the beginning at first, and all sizes once all is grown."""
+    """Boards have the initial numbers of tasks at first, and all sizes at the end of the growth."""
     early = [drawn(replace(SMALL, families=("paper",)), seed, 0.0).places - 1 for seed in range(20)]
     late = [drawn(replace(SMALL, families=("paper",)), seed, 0.7).places - 1 for seed in range(20)]
     assert (min(early), max(early)) == SMALL.initial_tasks
@@ -49,7 +49,7 @@ def test_sizes_grow_with_progress() -> None:
 
 
 def test_boards_have_similar_sizes() -> None:
-    """Many small games or few large ones: pairs stay near the limit, and agents below theirs."""
+    """Many small games or few large ones: pairs are near the limit, and agents below theirs."""
     for seed in range(15):
         games, n, _ = (board := drawn(Curriculum(families=("paper",)), seed)).shape
         assert n <= 80
@@ -58,7 +58,7 @@ def test_boards_have_similar_sizes() -> None:
 
 
 def test_energy_weights_and_targets_have_their_distributions() -> None:
-    """Energy weights are log-uniform; a share of the games have targets beyond the bound, with ability to spare."""
+    """Energy weights are log-uniform; a share of the games has targets above the bound, with spare ability."""
     curriculum = Curriculum(
         families=("paper",), max_pairs=3000, energy_weight=(0.2, 3.0), relaxed_fraction=0.3, max_relaxation=1.3
     )
@@ -74,7 +74,7 @@ def test_energy_weights_and_targets_have_their_distributions() -> None:
 
 
 def test_travel_reduces_ability() -> None:
-    """At finite speeds agents bring from a half to nearly all of their ability, less the farther they fly."""
+    """With finite speeds agents contribute between half and nearly all of their ability, less with distance."""
     board = drawn(replace(SMALL, families=("travel",), relaxed_fraction=0.0))
     share = (board.contribution / board.ability[..., None])[:, :, :-1]
     assert 0.4 < share.mean() < 0.99
@@ -93,7 +93,7 @@ def test_reference_makespan_is_the_best_bound() -> None:
 
 
 def test_own_instances_replace_drawn_ones() -> None:
-    """A board holds copies of those instances that are equally large, with their own energy weights."""
+    """A board holds copies of given instances of equal size, with different energy weights."""
     given = tuple(with_reference([paper_like(12, 3, 50, seed) for seed in range(3)] + [paper_like(9, 2, 40, 5)]))
     curriculum = replace(SMALL, instances=given, relaxed_fraction=0.0)
     seen = {drawn(curriculum, seed).shape[1:] for seed in range(10)}
@@ -103,14 +103,14 @@ def test_own_instances_replace_drawn_ones() -> None:
 
 
 def test_large_own_instances_use_sparse_candidates() -> None:
-    """Where one game alone has more pairs than a board should, agents bid for near tasks only."""
+    """If a single game exceeds the pair limit of a board, agents bid only for nearby tasks."""
     board = drawn(replace(SMALL, instances=tuple(with_reference([paper_like(100, 20, 400, 1)]))))
     assert board.shape[0] == 1
     assert board.shape[2] < 21
 
 
 def test_training_seeds_are_in_their_reserved_range(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Every instance is drawn with a seed from 10^9 to below 2 * 10^9, where nobody else draws."""
+    """Instances are drawn with seeds from 10^9 to below 2 * 10^9, which nothing else uses."""
     seeds = []
     module = "alloc.allocators.learned.training.families"
     monkeypatch.setattr(
@@ -122,7 +122,7 @@ def test_training_seeds_are_in_their_reserved_range(monkeypatch: pytest.MonkeyPa
 
 
 def test_game_length_grows_with_agents() -> None:
-    """A game has rounds enough for its agents."""
+    """A game has enough rounds for its agents."""
     few, many = (drawn(replace(SMALL, instances=tuple(with_reference([paper_like(n, 3, 4 * n, 0)])))) for n in (12, 72))
     assert SMALL.max_steps(few) < SMALL.max_steps(many)
     assert set(RECIPES) < set(FAMILIES)

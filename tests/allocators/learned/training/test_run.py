@@ -26,7 +26,7 @@ QUICK: dict[str, Any] = {"instances": INSTANCES, "decisions": 150, "parameters":
 
 
 def test_library_and_command_train_the_same_policy(tmp_path: Path) -> None:
-    """The policy file is the command's to the byte, the report is returned, and a solver takes the policy."""
+    """The policy files are equal to the byte, the report is returned, and a solver accepts the policy."""
     (tmp_path / "mine").mkdir()
     for number, instance in enumerate(INSTANCES):
         write_instance(instance, tmp_path / "mine" / f"{number}.json")
@@ -56,7 +56,7 @@ def test_training_can_be_observed_stopped_and_resumed(tmp_path: Path) -> None:
 
 
 def test_policy_can_initialise_another_method(tmp_path: Path) -> None:
-    """With `init` another method starts from the networks of a policy, and its metadata says what it was trained by."""
+    """With `init` another method starts from the networks of a policy, and its metadata records the origin."""
     train("ppo", tmp_path / "p", iterations=1, **QUICK)
     trainer = train("gappo", tmp_path / "g", iterations=1, init=tmp_path / "p", population=2, **QUICK)
     assert len(trainer.members) == 2
@@ -91,7 +91,7 @@ def test_policy_can_initialise_another_method(tmp_path: Path) -> None:
 def test_wrong_arguments_are_refused_before_anything_is_written(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, options: dict[str, Any], message: str
 ) -> None:
-    """Whatever cannot work is an `InputError` that names the parameter or the file."""
+    """Invalid arguments are an `InputError` that names the parameter or the file."""
     monkeypatch.chdir(tmp_path)
     Path("taken").write_text("somebody's")
     with pytest.raises(InputError, match=message):
@@ -100,7 +100,7 @@ def test_wrong_arguments_are_refused_before_anything_is_written(
 
 
 def test_run_is_not_overwritten(tmp_path: Path) -> None:
-    """A second run of the same name is refused while the first has generations, and begins anew where it has none."""
+    """A second run of the same name is refused if the first one has generations, and otherwise starts anew."""
     train("ppo", tmp_path / "p", iterations=0, **QUICK)
     train("ppo", tmp_path / "p", iterations=1, **QUICK)
     with pytest.raises(InputError, match="holds a training run; resume it"):
@@ -124,7 +124,7 @@ def test_failing_engine_is_a_training_error(tmp_path: Path, monkeypatch: pytest.
 
 @pytest.mark.slow
 def test_members_use_the_threads_of_the_engine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Torch computes with as many threads as the engine grants to an item."""
+    """Torch uses as many threads as the engine grants per item."""
     import torch
 
     seen: list[int] = []
@@ -142,7 +142,7 @@ def test_members_use_the_threads_of_the_engine(tmp_path: Path, monkeypatch: pyte
 
 
 def test_torch_is_imported_after_the_checks(tmp_path: Path) -> None:
-    """A mistake costs no import of torch."""
+    """Invalid arguments do not import torch."""
     code = (
         "import sys\nfrom alloc.allocators.learned.training import train\n"
         "try:\n    train('ppo', 'p', parameters={'clip_coef': -1})\n"

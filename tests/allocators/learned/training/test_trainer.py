@@ -82,7 +82,7 @@ def planned(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
     ids=[*METHODS, "rules of the paper"],
 )
 def test_resumed_run_continues_identically(tmp_path: Path, changes: dict[str, Any]) -> None:
-    """Two generations at once, and one and one with a checkpoint between, give the same figures and weights."""
+    """Two generations at once, or one and one with a checkpoint between, give the same figures and weights."""
     limits = Limits(steps=1000)
     whole, first, second = (trainer(**changes) for _ in range(3))
     whole.advance(limits)
@@ -97,7 +97,7 @@ def test_resumed_run_continues_identically(tmp_path: Path, changes: dict[str, An
 
 @pytest.mark.slow
 def test_processes_train_identically() -> None:
-    """Members that learn in other processes learn the same to the last bit."""
+    """Members trained in other processes are equal to the last bit."""
     here, there = trainer(), trainer()
     with ProcessEngine(2) as engine:
         for _ in range(2):
@@ -108,7 +108,7 @@ def test_processes_train_identically() -> None:
 
 
 def test_seeds_determine_weights_and_jobs() -> None:
-    """Another seed begins with other weights, and every job has its own seed."""
+    """Another seed gives other initial weights, and every job has its own seed."""
     one, other = trainer(1), trainer(2)
     assert not torch.equal(weights(one), weights(other))
     seeds = {one._job(member, Limits()).seed for member in range(3)}
@@ -118,7 +118,7 @@ def test_seeds_determine_weights_and_jobs() -> None:
 
 
 def test_jobs_modify_only_their_own_learner() -> None:
-    """A generation that is dropped leaves weights and optimisers as they were, though members were trained in it."""
+    """A discarded generation leaves weights and optimisers unchanged."""
     run, undisturbed = trainer(), trainer()
     for one in (run, undisturbed):
         one.advance()
@@ -133,7 +133,7 @@ def test_jobs_modify_only_their_own_learner() -> None:
 
 
 def test_train_writes_policy_checkpoint_and_log(paths: RunFiles) -> None:
-    """After every generation all three files are whole; the policy holds the population, and how it came about."""
+    """After every generation all three files are complete; the policy has the population and its metadata."""
     run = trainer(1)
     run_training(run, paths, limits=Limits(iterations=2))
     assert len(load_policy(paths.policy, "gappo")) == 3
@@ -149,7 +149,7 @@ def test_train_writes_policy_checkpoint_and_log(paths: RunFiles) -> None:
 
 
 def test_log_and_policy_are_completed_on_resume(paths: RunFiles) -> None:
-    """A run that was killed after its checkpoint, before the other files, writes them when it is resumed."""
+    """A run killed between writing the checkpoint and the other files writes these on resume."""
     run = trainer(1)
     run_training(run, paths, limits=Limits(iterations=2))
     log = paths.log.read_bytes()
@@ -180,7 +180,7 @@ def test_the_best_networks_are_kept(paths: RunFiles, planned: Callable[..., None
 
 
 def test_patience_ends_a_run_without_improvement(paths: RunFiles, planned: Callable[..., None]) -> None:
-    """Two generations in a row without better networks end it, one does not."""
+    """Two consecutive generations without better networks end it, one does not."""
     planned(0.5, 0.6, 0.4, 0.4, 0.5, 0.1)
     run = trainer(population=1, method="ppo")
     run_training(run, paths, limits=Limits(iterations=9, patience=2))
@@ -197,7 +197,7 @@ def test_steps_are_summed_over_members(paths: RunFiles) -> None:
 
 
 def test_progress_follows_the_first_given_limit() -> None:
-    """Schedules follow the steps; without them the generations, and the clock alone only if there is nothing else."""
+    """Schedules follow the steps, else the generations, else the clock."""
     run = trainer()
     assert run.progress(Limits()) == run.progress(Limits(steps=9)) == 0
     run.advance()
@@ -210,7 +210,7 @@ def test_progress_follows_the_first_given_limit() -> None:
 
 
 def test_members_start_from_given_weights() -> None:
-    """The networks of a policy file are dealt out in turn; without any, all members begin alike."""
+    """The networks of a policy file are assigned in turn; without any, all members have the same weights."""
     given = [Ppo(TINY.network, seed=seed).policy.state_dict() for seed in (8, 9)]
     run = Trainer(TINY, 0, BOARDS, given)
     for member, expected in zip(run.members, (given[0], given[1], given[0]), strict=True):
@@ -220,7 +220,7 @@ def test_members_start_from_given_weights() -> None:
 
 
 def test_reports_sum_over_all_members(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A report adds up what the members did, and fitness (12) gets their network evaluations."""
+    """A report sums over members, and fitness (12) gets their network evaluations."""
 
     def train_on(self: Ppo, job: TrainingJob) -> TrainingStats:
         return TrainingStats(10, 100, 1.0, 2.0, 0.0, 1e-3)
@@ -237,7 +237,7 @@ def test_reports_sum_over_all_members(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.parametrize("content", [None, b"", b"not a checkpoint"])
 def test_missing_and_broken_checkpoints_are_refused(tmp_path: Path, content: bytes | None) -> None:
-    """A missing or broken checkpoint is told in one line."""
+    """A missing or broken checkpoint is reported in one line."""
     if content is not None:
         (tmp_path / "checkpoint").write_bytes(content)
     with pytest.raises(InputError, match="checkpoint") as caught:
@@ -246,7 +246,7 @@ def test_missing_and_broken_checkpoints_are_refused(tmp_path: Path, content: byt
 
 
 def test_damaged_checkpoints_are_refused(tmp_path: Path) -> None:
-    """A checkpoint cut short, or with a hole, is told in plain words, not in those of torch."""
+    """A truncated or corrupt checkpoint is reported in plain words rather than torch's."""
     path = tmp_path / "checkpoint"
     trainer().save(path)
     whole = path.read_bytes()
@@ -258,7 +258,7 @@ def test_damaged_checkpoints_are_refused(tmp_path: Path) -> None:
 
 
 def test_checkpoints_of_other_versions_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """They are not gone on with, but what they hold is known."""
+    """They are not resumed, but their number of generations is known."""
     monkeypatch.setattr(checkpoint, "CHECKPOINT_FORMAT", "alloc-checkpoint/2")
     run = trainer()
     run.save(tmp_path / "none")
@@ -282,14 +282,14 @@ def test_checkpoints_of_other_versions_are_refused(tmp_path: Path, monkeypatch: 
     ],
 )
 def test_checkpoints_of_other_runs_are_refused(tmp_path: Path, changes: dict[str, Any], message: str) -> None:
-    """A checkpoint knows what it is a run of, and says what differs."""
+    """A checkpoint records its run, and the error says what differs."""
     trainer().save(tmp_path / "checkpoint")
     with pytest.raises(InputError, match=message):
         trainer(**changes).resume(tmp_path / "checkpoint")
 
 
 def test_metadata_keep_the_names_of_their_format(tmp_path: Path) -> None:
-    """Checkpoints name parameters as all of this format have, and errors name them as the program does."""
+    """Checkpoints use the parameter names of the format, errors those of the program."""
     trainer().save(tmp_path / "checkpoint")
     stored = torch.load(tmp_path / "checkpoint", weights_only=True)["description"]
     assert {
@@ -306,7 +306,7 @@ def test_metadata_keep_the_names_of_their_format(tmp_path: Path) -> None:
 
 
 def test_unreadable_files_are_not_reported_as_damaged(tmp_path, monkeypatch):
-    """No memory, no permission and a damaged file are three things: only the last is advised to be removed."""
+    """Lack of memory, lack of permission and damage differ: removal is advised only for damaged files."""
     path = tmp_path / "run.checkpoint"
     trainer().save(path)
     for error, words in (
@@ -331,6 +331,6 @@ def _raising(error):
 
 
 def test_ddpg_has_no_population():
-    """Breeding needs single networks, which is told before anything is trained."""
+    """Breeding needs single networks, which is reported before training."""
     with pytest.raises(InputError, match="population: breeding"):
         TrainingParameters(method="ddpg", population=2)

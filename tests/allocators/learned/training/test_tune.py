@@ -23,7 +23,7 @@ TINY = TrainingParameters("ppo", 1, 20, NetworkSize(4, 4, 1), method_parameters(
 
 @pytest.mark.needs("optuna")
 def test_study_starts_with_the_defaults_and_is_resumed(tmp_path: Path) -> None:
-    """Two trials, then one more in another process's place, are three; the first is what a user gets untuned."""
+    """Two trials, then one more in another process, are three; the first has the defaults."""
     path = tmp_path / "study.db"
     tune(open_study(path, "ppo", 0), TINY, 2, Limits(iterations=1), boards=BOARDS)
     again = open_study(path, "ppo", 0)
@@ -36,7 +36,7 @@ def test_study_starts_with_the_defaults_and_is_resumed(tmp_path: Path) -> None:
 
 @pytest.mark.needs("optuna")
 def test_poor_trials_are_pruned(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A trial that does worse than most before it is pruned."""
+    """A trial that is worse than most previous ones is pruned."""
     costs = iter([0.1] * 15 + [0.9] * 3)
     monkeypatch.setattr(module, "validate", lambda *_: Validation(next(costs), 0.0, 1.0, 0.1, 1.0, 0.0))
     study = open_study(tmp_path / "study.db", "ppo", 0)
@@ -46,7 +46,7 @@ def test_poor_trials_are_pruned(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
 
 @pytest.mark.parametrize("method", METHODS)
 def test_search_spaces_surround_the_defaults(method: str) -> None:
-    """What is tuned lies around the defaults of every method."""
+    """The ranges of tuned hyperparameters contain the defaults of every method."""
 
     class Lowest:
         def suggest_float(self, name: str, low: float, high: float, log: bool = False) -> float:
@@ -61,7 +61,7 @@ def test_search_spaces_surround_the_defaults(method: str) -> None:
 
 
 def test_missing_optuna_names_the_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Whoever tunes is told what to install."""
+    """The error says what to install."""
     monkeypatch.setitem(sys.modules, "optuna", None)
     with pytest.raises(InputError, match=r"alloc-mrta\[tune\]"):
         open_study(tmp_path / "study.db", "ppo", 0)
@@ -69,7 +69,7 @@ def test_missing_optuna_names_the_extra(tmp_path: Path, monkeypatch: pytest.Monk
 
 @pytest.mark.needs("optuna")
 def test_other_files_are_refused(tmp_path: Path) -> None:
-    """A file that is no SQLite database is told in one line."""
+    """A file that is not an SQLite database is reported in one line."""
     (tmp_path / "study.db").write_text("no database, and long enough to be seen as such" * 10)
     with pytest.raises(InputError, match="is not a study"):
         open_study(tmp_path / "study.db", "ppo", 0)

@@ -30,7 +30,7 @@ def network() -> ActorCritic:
 
 
 def test_makespan_and_cost_match_the_best_plan_of_the_game(network: ActorCritic) -> None:
-    """T, distance and cost agree with the evaluator's of every plan along the game, at its cheapest."""
+    """T, distance and cost equal the evaluator's for the cheapest plan along the game."""
     instance = paper_like(10, 3, 44, 1)
     curriculum, (board,) = games_on([instance], Curriculum())
     got = validate(network, [board], PLANNING, curriculum)
@@ -49,7 +49,7 @@ def test_makespan_and_cost_match_the_best_plan_of_the_game(network: ActorCritic)
 
 
 def test_cost_of_a_bad_game_is_capped(network: ActorCritic) -> None:
-    """However far from its reference a makespan is, it costs no more than an unserved task."""
+    """However far above its reference, a makespan costs no more than an unserved task."""
     instances = [paper_like(10, 3, 44, 1)] * 2
     references = [one.reference_h for one in with_reference(instances)]
     boards = [make_board(instances, references, [1.0] * 2, np.random.default_rng(0))]
@@ -59,7 +59,7 @@ def test_cost_of_a_bad_game_is_capped(network: ActorCritic) -> None:
 
 
 def test_unserved_tasks_are_reported_as_part_of_the_cost(network: ActorCritic) -> None:
-    """What nobody can serve is told, as a mean over boards as the cost is; the rest of the cost is small."""
+    """The mean number of unserved tasks is reported; the rest of the cost is small."""
     served, unserved = paper_like(10, 3, 44, 1), Instance(ability=[1], workload=[1, 1, 1], allowed_tasks=[[]])
     curriculum, boards = games_on([served, unserved], Curriculum())
     got = validate(network, boards, PLANNING, curriculum)
@@ -68,7 +68,7 @@ def test_unserved_tasks_are_reported_as_part_of_the_cost(network: ActorCritic) -
 
 
 def test_a_fifth_of_own_instances_is_held_out() -> None:
-    """With five or more instances, networks are judged by some that they do not learn from, always the same."""
+    """With five or more instances, validation uses a fixed subset that is not trained on."""
     instances = [paper_like(10, 3, 44, seed) for seed in range(10)]
     train, held = hold_out(instances)
     assert (len(train), len(held)) == (8, 2)
@@ -83,7 +83,7 @@ def test_a_fifth_of_own_instances_is_held_out() -> None:
 
 
 def test_instances_without_work_are_left_out(network: ActorCritic) -> None:
-    """Where there is nothing to do no network is better than another: such instances are left out."""
+    """Instances without work cannot distinguish networks."""
     idle = Instance(ability=[1, 2], workload=[0, 0])
     busy = [paper_like(10, 3, 44, seed) for seed in range(6)]
     train, held = hold_out([idle, *busy, idle, idle, idle])
@@ -96,7 +96,7 @@ def test_instances_without_work_are_left_out(network: ActorCritic) -> None:
 
 
 def test_validation_games_are_fixed() -> None:
-    """Paper-like games of scenario 1's size come first, then every family twice."""
+    """Paper-like games of scenario 1's size come first, followed by two of every family."""
     boards, again = (validation_boards(Curriculum()) for _ in range(2))
     assert [board.shape[:2] for board in boards] == [(12, 100), (2 * len(RECIPES), 60)]
     assert all(torch.equal(one.need, two.need) for one, two in zip(boards, again, strict=True))

@@ -11,7 +11,7 @@ from alloc.problems.missions.events import EventKind
 
 
 def test_frame_shows_the_state_at_its_hour() -> None:
-    """A task has a name from when it appears; an agent that has failed is a cross, and no square any more."""
+    """A task has a name from its appearance on; a failed agent is a cross instead of a square."""
     mission = random_mission(MissionParameters(family="failures", agents=6, tasks=10), seed=3)
     recorder = Recorder()
     course = recorder.course(simulate(mission, "nearest", deadline_ms=None, observe=recorder).result)

@@ -9,7 +9,7 @@ from alloc.problems import Instance, Mission, Recorder
 
 
 def test_labels_do_not_cross_the_frame() -> None:
-    """A task with much work at the upper edge has its name below or beside it, not across the frame."""
+    """The label of a large task at the upper edge is below or beside it, not across the frame."""
     instance = Instance(
         ability=[1],
         agent_position=[[0, 0]],

@@ -52,7 +52,7 @@ def page(course: Course, tmp_path: Path) -> Path:
 
 
 def test_page_is_self_contained(page: Path) -> None:
-    """There is one file without links, whose policy forbids to load anything, and names are data, never markup."""
+    """One file without links, whose policy forbids loading anything; names are data, never markup."""
     text = page.read_text(encoding="utf-8")
     assert re.findall(r"""\s(?:src|href)=["']?([^"'>\s]+)""", text.replace("src=x", "")) == ["data:,"]
     assert "default-src 'none'" in text
@@ -62,7 +62,7 @@ def test_page_is_self_contained(page: Path) -> None:
 
 
 def test_page_contains_the_recorded_knowledge(course: Course) -> None:
-    """Each hour of a report is kept to a part in 65,000 of the mission, and 0 stands for what was not known."""
+    """Report hours are exact to one part in 65,000 of the mission; 0 means unknown."""
     import base64
 
     assert course.awareness is not None
@@ -76,7 +76,7 @@ def test_page_contains_the_recorded_knowledge(course: Course) -> None:
 
 
 def test_agents_do_not_know_tasks_beyond_their_sensing_radius(course: Course) -> None:
-    """At the beginning an agent knows itself and what lies within 2, and nothing of what has not appeared."""
+    """At first an agent knows itself and what lies within 2, and no task that has not appeared."""
     assert course.awareness is not None
     first = ~np.isnan(course.awareness.reports[:, 1])  # the second moment: all have looked around
     assert first[:, :3].diagonal().all()
@@ -117,7 +117,7 @@ document.body.replaceChildren(JSON.stringify(out));
 
 @needs_browser
 def test_page_plays_and_scrubs(page: Path, course: Course, tmp_path: Path) -> None:
-    """The page has a heading, begins at 0, shows another hour when the slider moves, plays, and stops; no errors."""
+    """The page has a heading, starts at hour 0, follows the slider, plays, and stops; there are no errors."""
     failed = "<b> has failed."
     heading = title(course).split("\n")[0]
     expected = [heading, 1, 0, 2, True, failed, False, True, True, "pause", True, "play", 0]
@@ -125,7 +125,7 @@ def test_page_plays_and_scrubs(page: Path, course: Course, tmp_path: Path) -> No
 
 
 def test_log_gives_the_same_course(course: Course) -> None:
-    """What was recorded of a run is found again from its log, but for what agents knew; and the log is the same."""
+    """The course from the log equals the recorded one, except for the knowledge of agents."""
     run = simulate(rescue(), "greedy")
     again = course_of(run.log)
     assert (again.legs, again.levels, again.messages, again.end) == (
@@ -138,7 +138,7 @@ def test_log_gives_the_same_course(course: Course) -> None:
 
 
 def test_film_is_written(course: Course, tmp_path: Path) -> None:
-    """A .gif has as many pictures as were asked for, and they are not all alike."""
+    """A .gif has the requested number of frames, which differ."""
     from PIL import Image, ImageChops
 
     animate_mission(course, str(tmp_path / "run.gif"), frames=3)
@@ -150,7 +150,7 @@ def test_film_is_written(course: Course, tmp_path: Path) -> None:
 
 
 def test_mp4_without_ffmpeg_is_refused_in_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
-    """It is said what is missing, and what can be written instead."""
+    """The error says what is missing, and which format works instead."""
     monkeypatch.setenv("PATH", "")
     with pytest.raises(InputError, match=r"run\.mp4: needs the program ffmpeg, .* or write \.gif or \.html"):
         check_animation("run.mp4")
