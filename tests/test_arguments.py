@@ -121,7 +121,7 @@ def test_wrong_arguments_are_errors_that_name_them(door, name, value):
 
 
 def test_equivalent_types_are_accepted(tmp_path):
-    """numpy's numbers, a dict of ids and a result as start, missing values as pandas has them: all as plain ones."""
+    """NumPy numbers, a dict of ids or a result as start, and pandas's missing values are accepted."""
     plain = run(seed=3, iterations=5, objective="makespan")
     other = run(seed=np.int64(3), iterations=np.int32(5), objective=np.str_("makespan"), threads=np.int8(1))
     assert other.allocation == plain.allocation
@@ -138,7 +138,7 @@ def test_equivalent_types_are_accepted(tmp_path):
 
 @pytest.mark.parametrize("copied", [deepcopy, lambda value: pickle.loads(pickle.dumps(value))])
 def test_copies_are_read_only(copied):
-    """What was pickled or copied can be written to no more than what it was made from."""
+    """Pickled and copied objects are read-only, too."""
     instance = copied(make(allowed_tasks=[[0], None, [1, 2]]))
     allocation = copied(Allocation([0, 1, 2]))
     arrays = [instance.ability, instance.allowed_tasks[2], allocation.task_of_agent]
@@ -146,7 +146,7 @@ def test_copies_are_read_only(copied):
 
 
 def test_all_errors_share_a_base_class():
-    """One base catches all that is raised on purpose; the built-in kinds of today still do."""
+    """One base class catches all deliberate errors, which are also the corresponding built-in exceptions."""
     for error, kind in (
         (InputError, ValueError),
         (RefusedError, ValueError),

@@ -8,7 +8,7 @@ from alloc.problems import Allocation, Instance, evaluate
 
 @pytest.mark.parametrize("seed", range(30))
 def test_evaluator_agrees_with_the_oracle(seed):
-    """The optimum found by brute force scores the same by `evaluate`, which shares no code with it."""
+    """The optimum found by brute force has the same scores by `evaluate`, which shares no code with it."""
     instance = tiny_instance(seed)
     best = brute_force(instance)
     score = evaluate(instance, Allocation(best.plan))
@@ -20,7 +20,7 @@ def test_evaluator_agrees_with_the_oracle(seed):
 
 @pytest.mark.parametrize("seed", range(30))
 def test_no_random_plan_beats_the_optimum(seed):
-    """No random plan beats the optimum in the project's order."""
+    """No random plan is better than the optimum in the order of objectives."""
     instance, rng = tiny_instance(seed), np.random.default_rng(seed)
     best = evaluate(instance, Allocation(brute_force(instance).plan))
     for _ in range(50):
@@ -47,6 +47,6 @@ def test_travel_delays_work():
 
 
 def test_reach_has_a_tolerance():
-    """A battery that is just enough, up to rounding, is enough."""
+    """A battery that suffices up to rounding is enough."""
     instance = Instance(ability=[1], workload=[1], agent_position=[[0, 0]], task_position=[[0.3, 0]], battery=[0.3])
     assert reachable(instance)[1].all()

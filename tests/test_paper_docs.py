@@ -37,7 +37,7 @@ def defines(body: list[ast.stmt], name: str) -> bool:
 
 @pytest.mark.parametrize("page", PAGES)
 def test_every_name_exists_in_the_code(page: str) -> None:
-    """A function, class or constant that is renamed or moved takes its mention along."""
+    """Functions, classes and constants mentioned in the pages exist at the given place."""
     named = references(page)
     files = {path: (ROOT if path.startswith("examples/") else CODE) / path for path, _ in named}
     missing = [f"{path}:{name}" for path, name in named if not files[path].is_file()]
@@ -48,14 +48,14 @@ def test_every_name_exists_in_the_code(page: str) -> None:
 
 
 def test_unknown_names_are_detected() -> None:
-    """Neither a wrong function nor a wrong member of a class passes."""
+    """Wrong functions and wrong members of a class are detected."""
     body = ast.parse("LIMIT = 1\nclass A:\n    size: int = 2\n    def go(self): ...\n").body
     assert [defines(body, name) for name in ("LIMIT", "A", "A.size", "A.go")] == [True] * 4
     assert [defines(body, name) for name in ("go", "A.stop", "LIMIT.x", "A.go.x")] == [False] * 4
 
 
 def test_every_part_of_the_paper_is_covered() -> None:
-    """Equations 1 to 19, all 39 lines of Algorithm 1, Table 1 and figures 1 to 6 are gone through."""
+    """Equations 1 to 19, all 39 lines of Algorithm 1, Table 1 and figures 1 to 6 are discussed."""
     text = text_of("paper/paper.md")
     assert [int(number) for number in re.findall(r"\*\*\((\d+)\)\*\*", text)] == list(range(1, 20))
     rows = re.findall(r"^\| (\d+)(?:-(\d+))? \|", text, re.MULTILINE)

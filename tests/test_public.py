@@ -74,7 +74,7 @@ def test_public_functions_are_typed(package: ModuleType) -> None:
 
 
 def test_main_functions_and_methods_are_public() -> None:
-    """What users need is there by name, the class of every built-in method among it."""
+    """What users need is public, including the class of every built-in method."""
     assert set(alloc.allocators.__all__) >= VERBS | METHODS
     classes = {target.partition(":")[2] for target in alloc.allocators.registry.TARGETS.values()}
     assert classes == METHODS
@@ -91,7 +91,7 @@ def test_main_functions_and_methods_are_public() -> None:
     ],
 )
 def test_functions_are_not_shadowed_by_modules(statement: str, kind: str) -> None:
-    """`solve`, `pareto` and `explain` stay functions, whichever of module and function is imported first."""
+    """`solve`, `pareto` and `explain` are functions, whichever of module and function is imported first."""
     code = f"import alloc.allocators; {statement}; print(*(type(getattr(alloc.allocators, name)).__name__ for name in "
     code += "('solve', 'pareto', 'explain')))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

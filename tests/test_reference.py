@@ -31,13 +31,13 @@ def pages(script: ModuleType) -> dict[str, str]:
 
 
 def test_pages_are_up_to_date(pages: dict[str, str]) -> None:
-    """They are those of the docstrings, and no others; `python docs/make_reference.py` writes them anew."""
+    """The pages equal those generated from the docstrings; `python docs/make_reference.py` regenerates them."""
     folder = DOCS / "reference"
     assert {path.relative_to(folder).as_posix(): path.read_text("utf-8") for path in folder.rglob("*.md")} == pages
 
 
 def test_every_public_name_has_a_page(pages: dict[str, str]) -> None:
-    """Every name in `__all__` has one, with more than a heading, and stands once in the table of all with a summary."""
+    """Every name in `__all__` has a page with content, and is listed once in the index with a summary."""
     index = pages["index.md"]
     entries = {path.rpartition("/")[2][:-3]: text for path, text in pages.items() if path != "index.md"}
     assert set(entries) == {*problems.__all__, *allocators.__all__}
@@ -47,7 +47,7 @@ def test_every_public_name_has_a_page(pages: dict[str, str]) -> None:
 
 
 def test_page_names_differ_without_case(pages: dict[str, str]) -> None:
-    """As on macOS and Windows."""
+    """Page names differ on file systems that ignore case, such as those of macOS and Windows."""
     assert len({path.casefold() for path in pages}) == len(pages)
 
 

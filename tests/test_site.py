@@ -35,7 +35,7 @@ def hooks(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
 
 
 def test_every_page_is_in_the_navigation() -> None:
-    """Each page of docs/ but of the reference is named once in mkdocs.yml, and each that is named is there or made."""
+    """Each page of docs/ outside the reference is once in mkdocs.yml, and each listed page exists or is generated."""
     made = {
         "use/commands.md",
         *(f"examples/notebooks/{path.stem}.md" for path in ROOT.glob("examples/notebooks/*.ipynb")),
@@ -48,7 +48,7 @@ def test_every_page_is_in_the_navigation() -> None:
 
 
 def test_lists_are_preceded_by_empty_lines() -> None:
-    """A list that follows a paragraph does so after an empty line, without which it is a part of it."""
+    """A list after a paragraph needs an empty line before it to be rendered as a list."""
     found = {}
     for path in [*DOCS.rglob("*.md"), ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md"]:
         text = re.sub(r"^```.*?^```", "", path.read_text("utf-8"), flags=re.MULTILINE | re.DOTALL)
@@ -57,7 +57,7 @@ def test_lists_are_preceded_by_empty_lines() -> None:
 
 
 def test_page_of_options_is_complete() -> None:
-    """Every command has a chapter, with each option that its help shows."""
+    """Every command has a section with each option in its help."""
     page = loaded("make_commands").page()
     chapters = dict(re.findall(r"^## alloc ([\w-]+)\n(.*?)(?=^## |\Z)", page, re.MULTILINE | re.DOTALL))
     assert set(chapters) == set(COMMANDS)
@@ -69,7 +69,7 @@ def test_page_of_options_is_complete() -> None:
 
 
 def test_table_of_methods_matches_their_capabilities() -> None:
-    """Each method has a page that is linked, and the marks of the table are those of its description."""
+    """Each method has a linked page, and the marks of the table match its description."""
     page = (DOCS / "methods" / "index.md").read_text("utf-8")
     rows = re.findall(r"^\| (`[^|]*`) \|(.*)\|$", page.split("## What each can do")[1].split("## ")[0], re.MULTILINE)
     found = {
@@ -86,7 +86,7 @@ def test_table_of_methods_matches_their_capabilities() -> None:
 
 
 def test_diagram_of_layers_has_every_package() -> None:
-    """A folder that is added to a package stands in the picture of the architecture."""
+    """Every folder of a package is in the diagram of the architecture."""
     picture = (DOCS / "developing" / "architecture.svg").read_text("utf-8")
     folders = [
         path.parent.name
@@ -97,7 +97,7 @@ def test_diagram_of_layers_has_every_package() -> None:
 
 
 def test_notebook_becomes_a_page(tmp_path: Path) -> None:
-    """Text stays, code and what it printed are fenced, and a picture is a file of its own beside the page."""
+    """Text is kept, code and its output are fenced, and pictures are separate files beside the page."""
     png = {"output_type": "execute_result", "data": {"image/png": ["aGk=\n"], "text/plain": ["<Image>"]}}
     said = {"output_type": "stream", "text": ["1\n", "2\n"]}
     cells = [
@@ -119,7 +119,7 @@ def test_notebook_becomes_a_page(tmp_path: Path) -> None:
 
 @pytest.mark.needs("mkdocs")
 def test_links_out_of_docs_point_into_the_site(hooks: ModuleType) -> None:
-    """Files beside docs/ stand beside its pages in the site, and a label that is a file's name becomes its title."""
+    """Files outside docs/ are copied into the site, and a label that is a file name becomes its title."""
     assert hooks.site_links("[e](../../examples/replan.py)", "use/replanning.md") == "[e](../examples/replan.py)"
     assert hooks.site_links("[p](../../examples/plugin)", "use/plugins.md") == "[p](../examples/plugin/README.md)"
     assert hooks.site_links("[a](docs/glossary.md#x)", "CONTRIBUTING.md") == "[a](glossary.md#x)"
@@ -129,7 +129,7 @@ def test_links_out_of_docs_point_into_the_site(hooks: ModuleType) -> None:
 
 @pytest.mark.needs("mkdocs")
 def test_classes_are_linked_to_the_reference(hooks: ModuleType) -> None:
-    """Their names in sentences are; those in code, headings and links are not, nor are functions on other pages."""
+    """Class names in sentences are linked; those in code, headings and links, and functions, are not."""
     reference = {"Search": "reference/classes/Search.md", "solve": "reference/functions/solve.md"}
     for text in (
         "```python\n`Search`\n```",
@@ -148,7 +148,7 @@ def test_classes_are_linked_to_the_reference(hooks: ModuleType) -> None:
 
 @pytest.mark.needs("mkdocs")
 def test_navigation_has_a_page_for_each_name(hooks: ModuleType) -> None:
-    """Those of the reference are in the navigation once, below the table of all of them, by topic."""
+    """Pages of the reference are in the navigation once, by topic, below the index."""
     nav = [{"Reference": [{"Python": "reference/index.md"}]}]
     config = hooks.on_config(SimpleNamespace(nav=nav))
     index, *topics = config.nav[0]["Reference"][0]["Python"]
@@ -159,7 +159,7 @@ def test_navigation_has_a_page_for_each_name(hooks: ModuleType) -> None:
 
 @pytest.mark.needs("mkdocs")
 def test_network_resources_are_detected(hooks: ModuleType) -> None:
-    """Scripts, styles and pictures of other hosts are; files of the site and links for readers are not."""
+    """Scripts, styles and pictures of other hosts are detected; local files and links for readers are allowed."""
     for text in (
         '<script src="https://x.org/a.js">',
         '<link rel="stylesheet" href="https://x.org/a.css">',

@@ -30,7 +30,7 @@ def test_bounds_never_exceed_the_optimum(instance: Instance) -> None:
 
 @given(instances(most_agents=4, most_tasks=3))
 def test_energy_bound_never_increases_with_time(instance: Instance) -> None:
-    """More time never raises the bound on the energy."""
+    """More time never raises the energy bound."""
     best = brute_force(instance)
     assume(not best.unserved)
     tight, loose = (energy_lower_bound(instance, best.makespan * factor) for factor in (1.0, 2.0))
@@ -41,7 +41,7 @@ def test_energy_bound_never_increases_with_time(instance: Instance) -> None:
 
 @given(instances(most_agents=4, most_tasks=3))
 def test_bound_never_increases_with_another_agent(instance: Instance) -> None:
-    """With a copy of the first agent, the bound is as large or smaller, unless there are too few agents anyway."""
+    """A copy of the first agent never raises the bound, unless there are too few agents anyway."""
     assume(instance.n >= (instance.workload > 0).sum())
     more = rebuilt(instance, np.append(np.arange(instance.n), 0), np.arange(instance.m))
     assert makespan_lower_bound(more) <= makespan_lower_bound(instance) * ROUNDING
@@ -64,7 +64,7 @@ def test_every_part_of_the_bound_is_tight_somewhere(fields: dict, bound: float) 
 
 
 def test_bound_by_arrival_matches_hand_calculation() -> None:
-    """Ability 2 that needs 3 hours to the nearest task cannot have done 4 before hour 5."""
+    """An agent of ability 2, 3 hours from the nearest task, cannot do 4 before hour 5."""
     instance = Instance(
         ability=[1, 1], workload=[2, 2], agent_position=[[3, 0]] * 2, task_position=[[0, 0], [0, 0]], speed=[1, 1]
     )
@@ -82,7 +82,7 @@ def test_bound_by_linear_programme_matches_hand_calculation() -> None:
 
 
 def test_energy_bound_matches_hand_calculation() -> None:
-    """Both tasks must be done in an hour: two agents fly 1 each at 5 a unit, one of the others stays."""
+    """Both tasks must be done in an hour: two agents fly 1 each at 5 per unit, one of the others stays."""
     instance = Instance(
         ability=[2, 2, 2],
         workload=[2, 4],
@@ -96,7 +96,7 @@ def test_energy_bound_matches_hand_calculation() -> None:
 
 @pytest.mark.parametrize("scenario", [1, 2, 3, 4])
 def test_bound_of_paper_instances_is_an_hour(scenario: int) -> None:
-    """Abilities and workloads have one sum, so that no bound lies below 1 h; and none above, as 1 h is reached."""
+    """Abilities and workloads have equal totals, so that the bound is 1 h, which is reached."""
     assert makespan_lower_bound(paper(scenario, 0)) == pytest.approx(1.0, abs=1e-12)
 
 

@@ -24,7 +24,7 @@ NAN = float("nan")
 
 
 def test_scores_match_hand_calculation(line: Instance) -> None:
-    """Agents of 2 and 1 do 6 in 2 h at no distance; that of 4, on its own task, does 4 in 1 h; the rest is idle."""
+    """Agents of 2 and 1 do 6 in 2 h without flying; that of 4, on its own task, does 4 in 1 h; the rest is idle."""
     score = evaluate(line, Allocation([0, 0, 1, -1]))
     assert score.completion_time.tolist() == [2.0, 1.0, 0.0]
     assert score.group_ability.tolist() == [3.0, 4.0, 0.0]
@@ -73,7 +73,7 @@ def test_reasons_of_violations(limits: dict, reason: str) -> None:
 
 
 def test_finite_speeds_match_hand_calculation() -> None:
-    """2 per hour from the start and 3 per hour from hour 2 do 10 by hour 3.2; who comes after that adds nothing."""
+    """2 per hour from the start and 3 per hour from hour 2 do 10 by hour 3.2; later arrivals add nothing."""
     instance = Instance(
         ability=[2, 3, 50],
         workload=[10],
@@ -88,14 +88,14 @@ def test_finite_speeds_match_hand_calculation() -> None:
 
 @given(st.lists(st.tuples(st.floats(0.1, 9), st.floats(0, 9)), min_size=1, max_size=6), st.floats(0.1, 50))
 def test_work_done_by_the_completion_time_is_the_workload(group: list[tuple[float, float]], workload: float) -> None:
-    """At the hour that is returned, the work done by all who have arrived is the workload."""
+    """At the returned hour, the work done by all agents that have arrived is the workload."""
     ability, arrival = np.array(group).T
     hour = completion_time(workload, ability, arrival)
     assert (ability * np.maximum(0.0, hour - arrival)).sum() == pytest.approx(workload, rel=1e-9)
 
 
 def test_no_workload() -> None:
-    """Without workload the makespan is 0, nobody is needed, and nothing is unserved."""
+    """Without workload the makespan is 0, no agent is needed, and nothing is unserved."""
     score = evaluate(Instance(ability=[1], workload=[0, 0]), Allocation([-1]))
     assert (score.makespan, score.unserved_tasks, score.battery_remaining_percent) == (0.0, (), None)
 
@@ -150,7 +150,7 @@ def test_comparison_is_lexicographic() -> None:
 
 @given(allocated(), st.randoms(use_true_random=False))
 def test_scores_are_permutation_invariant(case: tuple[Instance, Allocation], random: object) -> None:
-    """Agents and tasks in another order have the same scores."""
+    """Permuted agents and tasks have the same scores."""
     instance, allocation = case
     rng = np.random.default_rng(random.getrandbits(32))
     agents, tasks = rng.permutation(instance.n), rng.permutation(instance.m)
@@ -164,7 +164,7 @@ def test_scores_are_permutation_invariant(case: tuple[Instance, Allocation], ran
 
 @given(allocated(speeds=False), st.sampled_from([0.25, 3.0, 1e6]))
 def test_scaling_workloads_scales_times(case: tuple[Instance, Allocation], scale: float) -> None:
-    """Where travel takes no time, workloads times c take c times as long, at the same energy."""
+    """Without travel times, c times the workloads take c times as long, with the same energy."""
     instance, allocation = case
     score = evaluate(instance, allocation)
     scaled = evaluate(rebuilt(instance, np.arange(instance.n), np.arange(instance.m), scale), allocation)
@@ -174,7 +174,7 @@ def test_scaling_workloads_scales_times(case: tuple[Instance, Allocation], scale
 
 @given(instances(most_agents=4, most_tasks=3))
 def test_scores_match_brute_force(instance: Instance) -> None:
-    """The plan that brute force finds from the definitions alone scores what brute force says."""
+    """The optimal plan of brute force has the scores that brute force computed from the definitions."""
     best = brute_force(instance)
     score = evaluate(instance, Allocation(best.plan))
     assert not score.violations
@@ -183,7 +183,7 @@ def test_scores_match_brute_force(instance: Instance) -> None:
 
 
 def test_scores_are_read_only(line: Instance) -> None:
-    """Arrays of an evaluation cannot be changed by accident."""
+    """Arrays of an evaluation are read-only."""
     score = evaluate(line, Allocation.idle(line))
     with pytest.raises(ValueError, match="read-only"):
         score.completion_time[0] = 0

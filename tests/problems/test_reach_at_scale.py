@@ -77,7 +77,7 @@ def test_pairs_agree_with_the_table(instance: Instance, factor: float) -> None:
 
 @given(instances(), FACTORS, st.sampled_from([1, 4, 1 << 20]))
 def test_neighbours_match_the_table(instance: Instance, factor: float, chunk: int) -> None:
-    """Gathered by trees, in chunks of any size, they are what the table holds; the nearest is the least of a row."""
+    """Gathered by trees, in chunks of any size, they equal the table; the nearest is the minimum of a row."""
     instance = stretched(instance, factor)
     table = instance.reach
     with tableless(), patch("alloc.problems.distances.neighbours.CHUNK", chunk):
@@ -121,7 +121,7 @@ def _figures(instance: Instance, allocation: Allocation) -> list[Any]:
 
 
 def test_hundred_thousand_agents_need_no_table() -> None:
-    """Scores, bounds and repair of 100,000 agents with places and short ranges come without a table of all pairs."""
+    """Scores, bounds and repair of 100,000 agents with positions and short ranges need no table of all pairs."""
     rng = np.random.default_rng(0)
     n, m = 100_000, 1_000
     instance = Instance(
@@ -143,7 +143,7 @@ def test_hundred_thousand_agents_need_no_table() -> None:
 
 @pytest.mark.parametrize("limit", [0.05, 0.5, 1.6])
 def test_neighbours_are_gathered_only_where_they_can_be_held(limit: float) -> None:
-    """Few are gathered; more than the limit are not, and nobody waits for that."""
+    """Few are gathered; more than the limit are refused at once."""
     rng = np.random.default_rng(0)
     n, m = 5_000, 1_000
     instance = Instance(

@@ -46,7 +46,7 @@ def test_several_runs_are_a_list(alloc, mission):
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_keeps_the_runs_that_are_complete(alloc, mission, monkeypatch, number):
-    """Of several runs those before it are printed, with exit code 1; in the first there is nothing to print."""
+    """Completed runs are printed, with exit code 1; in the first run there is nothing to print."""
     module = importlib.import_module("alloc.allocators.online.run")
     inner = module.simulate_until
 

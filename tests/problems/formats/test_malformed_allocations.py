@@ -38,7 +38,7 @@ ALLOCATIONS = [
 
 @pytest.mark.parametrize(("document", "place", "words"), ALLOCATIONS)
 def test_invalid_allocations_are_located(tmp_path: Path, document: Any, place: str | None, words: str) -> None:
-    """Each fault in an allocation is told with its place."""
+    """Errors in an allocation name their place."""
     text = document if isinstance(document, str) else json.dumps(document)
     (tmp_path / "plan.json").write_text(text)
     error = the_error(tmp_path / "plan.json", lambda path: read_allocation(path, INSTANCE))
@@ -47,7 +47,7 @@ def test_invalid_allocations_are_located(tmp_path: Path, document: Any, place: s
 
 
 def test_instance_name_of_an_empty_front_is_checked(tmp_path: Path) -> None:
-    """The name of the instance of a front is checked even where no allocation is made for it."""
+    """The instance name of a front is checked even without any allocation."""
     (tmp_path / "front.json").write_text('{"format": "alloc-pareto/1", "instance": 4, "points": []}')
     error = the_error(tmp_path / "front.json", lambda path: read_allocations(path, INSTANCE))
     assert (error.place, error.message) == ("instance", "must be a string, got 4")

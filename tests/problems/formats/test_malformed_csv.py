@@ -132,7 +132,7 @@ def table_folder(folder: Path, files: dict[str, str | bytes]) -> Path:
 
 @pytest.mark.parametrize(("files", "place", "words"), TABLES)
 def test_invalid_tables_are_located(tmp_path: Path, files: dict[str, str | bytes], place: str, words: str) -> None:
-    """Each fault in a folder of tables is told with the file, the line as an editor counts it, and the column."""
+    """Errors in a folder of tables name the file, the line as an editor counts it, and the column."""
     error = the_error(table_folder(tmp_path / "fleet", files))
     assert error.place == place, str(error)
     assert words in error.message, str(error)
@@ -140,7 +140,7 @@ def test_invalid_tables_are_located(tmp_path: Path, files: dict[str, str | bytes
 
 @pytest.mark.parametrize("name", ["agents.csv", "tasks.csv", "distances.csv", "instance.json"])
 def test_tables_that_are_no_files_are_named(tmp_path: Path, name: str) -> None:
-    """A table that is a folder, a pipe or a dangling link is named in the error."""
+    """The error names a table that is a folder, a pipe or a dangling link."""
     path = table_folder(tmp_path / "fleet", {name: ""}) / name
     path.unlink()
     if name in ("agents.csv", "tasks.csv"):

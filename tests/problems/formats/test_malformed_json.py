@@ -62,7 +62,7 @@ JSON_TEXTS = {
 
 @pytest.mark.parametrize("case", JSON_TEXTS)
 def test_texts_that_are_not_an_instance_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, case: str) -> None:
-    """Text that is no JSON, or not the right JSON, gives its place, from a file and from standard input alike."""
+    """Text that is not the right JSON is located, in a file and on standard input alike."""
     text, place, words = JSON_TEXTS[case]
     (tmp_path / "x.json").write_text(text)
     monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(text.encode())))

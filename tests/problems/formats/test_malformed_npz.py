@@ -87,7 +87,7 @@ COLUMNS = [
 
 @pytest.mark.parametrize(("arrays", "place", "words"), COLUMNS)
 def test_invalid_arrays_are_located(tmp_path: Path, arrays: dict[str, Any], place: str, words: str) -> None:
-    """Each fault in a columnar file is told with the array, and the row where there is one."""
+    """Errors in a columnar file name the array and, if applicable, the row."""
     given = {name: value for name, value in {**ARRAYS, **arrays}.items() if value is not None}
     np.savez(tmp_path / "x.npz", **given)
     error = the_error(tmp_path / "x.npz")

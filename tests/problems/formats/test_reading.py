@@ -23,7 +23,7 @@ DESIGN = """{"format": "alloc-instance/1", "name": "demo", "tau": 0.5, "energy_p
 
 
 def test_documented_example_is_read(tmp_path: Path) -> None:
-    """Each field of the documented example lands where it belongs, and 2-D positions get z = 0."""
+    """Each field of the documented example is read correctly, and 2-D positions get z = 0."""
     (tmp_path / "x.json").write_text(DESIGN)
     instance = read_instance(tmp_path / "x.json")
     assert (instance.name, instance.tau, instance.energy_per_distance) == ("demo", 0.5, 6.0)
@@ -86,13 +86,13 @@ def test_csv_of_spreadsheets_is_read(tmp_path: Path) -> None:
 
 
 def test_byte_order_mark_is_ignored_in_json(tmp_path: Path) -> None:
-    """JSON saved by editors that put a byte order mark first is read all the same."""
+    """JSON with a leading byte order mark is read."""
     (tmp_path / "x.json").write_bytes(b"\xef\xbb\xbf" + DESIGN.encode())
     assert read_instance(tmp_path / "x.json").name == "demo"
 
 
 def test_npz_of_other_number_types_is_read(tmp_path: Path) -> None:
-    """Whole numbers, single precision, other byte orders and 2-D positions are fine in .npz."""
+    """Integers, single precision, other byte orders and 2-D positions are accepted in .npz."""
     np.savez_compressed(
         tmp_path / "x.npz",
         format="alloc-instance/1",

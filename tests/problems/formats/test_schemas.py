@@ -30,7 +30,7 @@ BEYOND += ("id of two of the", "joins two agents", "that an earlier row gives", 
 
 @pytest.mark.parametrize("name", SCHEMAS)
 def test_schemas_are_valid(name: str) -> None:
-    """Each is valid by the draft that it names, and describes the format of its name."""
+    """Each is valid by the draft that it declares, and describes the format of its name."""
     found = schema(name)
     assert found["$schema"] == Draft202012Validator.META_SCHEMA["$id"]
     Draft202012Validator.check_schema(found)
@@ -39,7 +39,7 @@ def test_schemas_are_valid(name: str) -> None:
 
 
 def test_every_format_has_a_schema() -> None:
-    """Each format that the code and the documents name has one; checkpoints are no JSON."""
+    """Each format named in the code and the documents has one, except checkpoints, which are not JSON."""
     package = Path(alloc.problems.__file__).parents[1]  # of the working tree, or as installed
     sources = [path for part in ("problems", "allocators", "cli") for path in (package / part).glob("**/*.py")]
     texts = [*TEXTS.values(), *(path.read_text("utf-8") for path in sources)]
@@ -119,7 +119,7 @@ def test_reader_and_schema_agree(varied: Instance) -> None:
 
 
 def test_missing_and_unknown_fields_of_instances_are_invalid(varied: Instance) -> None:
-    """Each required field that is left out, and any field that is not known, is a fault; others may be left out."""
+    """Omitting a required field, or adding an unknown one, is an error; other fields are optional."""
     document: dict[str, Any] = json.loads(json.dumps(to_document(varied)))
     validator = Draft202012Validator(schema("alloc-instance/1"))
     required = {("format",), ("agents",), ("tasks",), ("distances", "rows")}
@@ -163,7 +163,7 @@ def test_unknown_formats_are_errors() -> None:
 
 
 def test_fleet_example_uses_every_field() -> None:
-    """The example of a fleet on the earth is read, with speeds in km per minute, and has all the later fields."""
+    """The geographic example fleet is read, with speeds in km per minute, and has all the later fields."""
     fleet = read_instance(ROOT / "examples" / "fleet" / "fleet.json")
     assert fleet.metric == "geographic"
     assert fleet.speed.tolist() == pytest.approx([1.08, 1.08, 1.08, 1.44, 1.44, 0.54])

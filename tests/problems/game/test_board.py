@@ -20,7 +20,7 @@ def fields(board: Board) -> dict[str, torch.Tensor]:
 
 
 def test_units_match_hand_calculation(board: Board) -> None:
-    """Abilities and needs are in units of the mean ability, 2 here; distances have a mean of 0.66 where legal."""
+    """Abilities and needs are relative to the mean ability, here 2; reachable distances have a mean of 0.66."""
     assert board.ability.tolist() == [[0.5, 1.0, 1.5]]
     assert board.need.tolist() == [[2.0, 1.0, 0.0]]
     # legal: 0; 0.9 and 0.1; 0.2 and 0.8: a mean of 0.4, which becomes 0.66
@@ -31,7 +31,7 @@ def test_units_match_hand_calculation(board: Board) -> None:
 
 
 def test_reference_makespan_determines_the_needs(pair: Instance) -> None:
-    """Twice the hours, half the ability needed."""
+    """Twice the hours need half the ability."""
     assert layout(pair, hours=2.0).need.tolist() == [[1.0, 0.5, 0.0]]
 
 
@@ -42,7 +42,7 @@ def test_supply_and_reachable_share_match_hand_calculation(board: Board) -> None
 
 
 def test_weights_are_priorities_relative_to_their_mean() -> None:
-    """Tasks without workload do not count; where nobody has a priority, all weigh the same."""
+    """Tasks without workload do not count; without priorities, all weights are equal."""
     tasks = {"ability": [1], "workload": [1, 1, 0]}
     assert layout(Instance(**tasks, priority=[1, 3, 7])).weight.tolist() == [[0.5, 1.5, 0.0, 0.0]]
     assert layout(Instance(**tasks, priority=[0, 0, 7])).weight.tolist() == [[1.0, 1.0, 0.0, 0.0]]
@@ -50,12 +50,12 @@ def test_weights_are_priorities_relative_to_their_mean() -> None:
 
 
 def test_agents_start_at_the_nearest_task_in_reach(board: Board) -> None:
-    """Without a start task, an agent begins where it has least to fly."""
+    """Without a start task, an agent starts at the nearest task."""
     assert board.start.tolist() == [[0, 1, 0]]
 
 
 def test_start_task_takes_precedence() -> None:
-    """A start task counts, unless the agent cannot take it; who can take nothing is idle."""
+    """A start task counts unless the agent cannot take it; agents that can take no task are idle."""
     instance = Instance(
         ability=[1, 1, 1],
         workload=[1, 1],
@@ -67,12 +67,12 @@ def test_start_task_takes_precedence() -> None:
 
 
 def test_plan_takes_precedence_over_start_tasks(pair: Instance) -> None:
-    """A plan goes before the start; whom it sends astray begins as without it."""
+    """A plan precedes the start; agents whose task in it is out of reach start as without it."""
     assert layout(pair, plan=np.array([1, 0, IDLE])).start.tolist() == [[0, 0, 2]]
 
 
 def test_ties_are_broken_by_the_generator() -> None:
-    """Agents between equally near tasks spread over them, by the seed."""
+    """Agents between equally near tasks are distributed over them, depending on the seed."""
     instance = Instance(ability=np.ones(40), workload=np.ones(4))
     starts = [layout(instance, seed=seed).start for seed in (0, 0, 1)]
     assert torch.equal(starts[0], starts[1])
@@ -81,7 +81,7 @@ def test_ties_are_broken_by_the_generator() -> None:
 
 
 def test_travel_time_reduces_ability() -> None:
-    """An agent that flies for half of the reference makespan brings half its ability, and nothing after all of it."""
+    """An agent that flies for half of the reference makespan contributes half its ability; after all of it, nothing."""
     instance = Instance(
         ability=[2, 2],
         workload=[1, 1, 1],
@@ -96,7 +96,7 @@ def test_travel_time_reduces_ability() -> None:
 
 @given(instances(speeds=False))
 def test_legal_actions_match_reach(instance: Instance) -> None:
-    """Without travel times an agent may go where it can reach something to do, and be idle."""
+    """Without travel times an agent may go to reachable tasks with workload, and be idle."""
     board = layout(instance)
     expected = reachable(instance)[1] & (instance.workload > 0)
     assert np.array_equal(board.legal[0, :, :-1].numpy(), expected)
@@ -117,7 +117,7 @@ def test_group_abilities_match_the_evaluator(instance: Instance, random) -> None
 
 
 def test_games_are_selected_by_index() -> None:
-    """A board of chosen games has these, in this order, and a game may be chosen twice."""
+    """Games are selected in the given order, also repeatedly."""
     games = [paper_like(8, 3, 30, seed) for seed in range(3)]
     chosen = layout(*games)[torch.tensor([2, 0, 2])]
     for name, value in fields(layout(games[2], games[0], games[2])).items():
@@ -125,7 +125,7 @@ def test_games_are_selected_by_index() -> None:
 
 
 def test_boards_of_several_instances_match_single_boards() -> None:
-    """Games side by side are laid out as each by itself."""
+    """Batched games have the same layout as single ones."""
     games = [paper_like(8, 3, 30, seed) for seed in range(3)]
     together = layout(*games)
     for number, game in enumerate(games):
@@ -134,7 +134,7 @@ def test_boards_of_several_instances_match_single_boards() -> None:
 
 
 def test_units_do_not_matter() -> None:
-    """Other units of work, time and distance lay out the same game, but for tau and the scale themselves."""
+    """Other units of work, time and distance give the same game, except for tau and the scale."""
     one = random_instance(Family(agents=9, tasks=4, starts="own", communication_range=(0.5, 1.0), battery=(2, 5)), 3)
     other = Instance(
         ability=one.ability * 10,
@@ -154,7 +154,7 @@ def test_units_do_not_matter() -> None:
 @pytest.mark.parametrize("hours", [0.0, 1e-300, 1.0, 1e300])
 @pytest.mark.parametrize("near", [None, 1])
 def test_layout_is_always_finite(name: str, hours: float, near: int | None) -> None:
-    """Whatever the numbers, no field of a board is NaN, and none but the endurance is infinite; nothing warns."""
+    """For extreme numbers, no field of a board is NaN, and only the endurance is infinite; there are no warnings."""
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         board = layout(EXTREMES[name], hours=hours, near=near)
@@ -165,11 +165,11 @@ def test_layout_is_always_finite(name: str, hours: float, near: int | None) -> N
 
 
 def test_large_mean_ability_keeps_log_tau() -> None:
-    """0.5^500 is 0 in single precision; its logarithm is not."""
+    """0.5^500 is 0 in single precision, but its logarithm is not."""
     assert layout(Instance(ability=[500], workload=[1])).log_tau.item() == pytest.approx(500 * np.log(0.5))
 
 
 def test_number_of_reference_makespans_must_match(pair: Instance) -> None:
-    """A reference makespan per instance, not fewer."""
+    """There must be a reference makespan for each instance."""
     with pytest.raises(ValueError, match="shorter"):
         make_board([pair, pair], [1.0], [0.5, 0.5], np.random.default_rng(0))

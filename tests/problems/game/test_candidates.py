@@ -25,7 +25,7 @@ def spread(request: pytest.FixtureRequest) -> Instance:
 
 
 def test_nearest_candidates_match_hand_calculation() -> None:
-    """Of five tasks on a line, an agent at 0 has the two nearest that it may do and that need anything."""
+    """Of five tasks on a line, an agent at 0 has the two nearest allowed tasks with workload."""
     instance = Instance(
         ability=[1],
         workload=[1, 0, 1, 1, 1],
@@ -40,7 +40,7 @@ def test_nearest_candidates_match_hand_calculation() -> None:
 
 
 def test_padding_candidates_are_illegal() -> None:
-    """Who can take fewer tasks than it has candidates has places left over that nobody can go to."""
+    """An agent with fewer tasks than candidates has padding candidates that are illegal."""
     instance = Instance(ability=[1], workload=[1, 1, 1], allowed_tasks=[[1]])
     goal, _, _, legal = candidate_tasks(instance, 2, None)
     assert goal[legal].tolist() == [1, 3]
@@ -55,7 +55,7 @@ def test_candidates_are_distinct(spread: Instance) -> None:
 
 
 def test_candidates_include_start_and_plan(spread: Instance) -> None:
-    """Where an agent begins and where a plan has it are among its candidates."""
+    """The start task of an agent and its task in a plan are among its candidates."""
     plan = np.random.default_rng(0).integers(-1, spread.m, spread.n)
     goal, _, _, _ = candidate_tasks(spread, 3, plan)
     for wanted in (spread.start_task, plan):
@@ -71,7 +71,7 @@ def test_board_is_dense_with_enough_candidates(spread: Instance, near: int | Non
 
 
 def test_sparse_candidates_match_the_dense_board(spread: Instance) -> None:
-    """Candidates have the distance, up to the scale, and the legality that they have among all tasks."""
+    """Candidates have the distance, up to the scale, and the legality of the dense board."""
     goal, distance, _, legal = candidate_tasks(spread, 6, None)
     _, far, _, able = candidate_tasks(spread, None, None)
     rows = np.arange(spread.n)[:, None]
@@ -80,7 +80,7 @@ def test_sparse_candidates_match_the_dense_board(spread: Instance) -> None:
 
 
 def test_isolated_tasks_have_candidate_agents() -> None:
-    """A task that is far from everybody is a candidate of agents near it with ample ability, the nearest among them."""
+    """A task far from all agents is a candidate of the nearest agents, with ample ability."""
     place = np.column_stack([np.linspace(0, 1, 30), np.zeros(30)])
     sites = np.vstack([np.column_stack([np.linspace(0, 1, 11), np.zeros(11)]), [[1.0, 9.0]]])
     instance = Instance(ability=np.ones(30), workload=np.ones(12), task_position=sites, agent_position=place)
@@ -91,7 +91,7 @@ def test_isolated_tasks_have_candidate_agents() -> None:
 
 
 def test_every_task_that_can_be_served_is_a_candidate() -> None:
-    """On clustered sites no task is without an agent that bids for it, if any can reach it."""
+    """On clustered sites every reachable task is a candidate of some agent."""
     for seed in range(5):
         family = Family(agents=120, tasks=40, starts="own", sites="clustered", dimensions=2)
         instance = random_instance(family, seed)
@@ -100,7 +100,7 @@ def test_every_task_that_can_be_served_is_a_candidate() -> None:
 
 
 def test_sparse_candidates_on_paper_instances() -> None:
-    """Everybody begins at its start task on a board of near candidates as on the dense one."""
+    """All agents start at their start tasks on sparse and dense boards."""
     instance = paper_like(50, 20, 210, 0)
     for board in (layout(instance), layout(instance, near=5)):
         start = board.candidates.gather(2, board.start[..., None])[0, :, 0]

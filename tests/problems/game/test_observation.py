@@ -70,13 +70,13 @@ def test_pair_features_match_hand_calculation(board: Board) -> None:
 
 
 def test_agent_features_match_hand_calculation(board: Board) -> None:
-    """The second agent, of ability 1, alone at the second task, 0.1 * 1.65 away, which needs 1."""
+    """The second agent, of ability 1, is alone at the second task, 0.1 * 1.65 away, which needs 1."""
     seen = observe_agents(board, reset(board))[0, 1].tolist()
     assert seen == pytest.approx([0, 0, 1, 1, 0.165, 0.0825, 1, 0], abs=1e-6)
 
 
 def test_task_features_match_hand_calculation(board: Board) -> None:
-    """With groups of 0.5 for 2 and of 2.5 for 1: short by 1.5 of 3 and by half of the mean, with 1.5 to spare."""
+    """Groups of 0.5 for 2 and of 2.5 for 1: short by 1.5 of 3 and by half of the mean, with a surplus of 1.5."""
     seen = observe_tasks(board, state_of(board, np.array([0, 1, 1])))[0]
     short = [0.75, 0.5, 2, np.log(2) - 1.5, 0.5 - 1, np.log(2) - 1.5, 0]
     everywhere = [0.25, 2, 0, -0.5]
@@ -88,7 +88,7 @@ def test_task_features_match_hand_calculation(board: Board) -> None:
 
 @given(instances(), st.integers(0, 99))
 def test_observations_are_finite_and_bounded(instance: Instance, seed: int) -> None:
-    """Features stay within -2 and 2, also of idle agents and of tasks without workload."""
+    """Features are within -2 and 2, also of idle agents and of tasks without workload."""
     board = layout(instance)
     state = reset(board)
     draws = torch.rand(board.shape, generator=torch.Generator().manual_seed(seed))
@@ -110,7 +110,7 @@ def _check(board: Board, state) -> None:
 @pytest.mark.parametrize("reward", list(Reward))
 @pytest.mark.parametrize("flying", [False, True])
 def test_extremes_stay_finite(name: str, hours: float, reward: Reward, flying: bool) -> None:
-    """Whatever the numbers, no feature and no reward ever is NaN or infinite."""
+    """For extreme numbers, no feature and no reward is NaN or infinite."""
     rules, board = Rules(reward=reward, flying=flying), layout(EXTREMES[name], hours=hours)
     state, generator = reset(board), torch.Generator().manual_seed(0)
     for _ in range(3):
@@ -129,7 +129,7 @@ def test_extremes_stay_finite(name: str, hours: float, reward: Reward, flying: b
 
 @given(instances(speeds=False), st.integers(0, 99))
 def test_observations_are_permutation_equivariant(instance: Instance, seed: int) -> None:
-    """Agents and tasks in another order are seen in that order, and nothing else changes."""
+    """Permuting agents and tasks permutes the observations."""
     # a start task without a position would be lost in the relabelled instance
     instance = replace(instance, task_position=np.nan_to_num(instance.task_position))
     rng = np.random.default_rng(seed)

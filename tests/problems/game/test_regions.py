@@ -17,7 +17,7 @@ from alloc.problems.game.regions import lay_out_regions
 @pytest.mark.parametrize("speed", [None, (0.5, 2.0)])
 @pytest.mark.parametrize("dimensions", [2, 3])
 def test_region_matches_the_board_of_its_own_instance(speed, dimensions: int) -> None:
-    """Each game on a region is that of the instance with these agents and tasks alone, but for the battery."""
+    """Each game on a region equals that of the instance with only these agents and tasks, except for batteries."""
     family = Family(
         agents=14, tasks=6, starts="own", communication_range=(0.4, 1.5), speed=speed, priority=(1, 3),
         dimensions=dimensions, battery=None,
@@ -43,7 +43,7 @@ def test_region_matches_the_board_of_its_own_instance(speed, dimensions: int) ->
 
 
 def test_padding_agents_can_only_be_idle() -> None:
-    """Regions of fewer agents are padded with agents without ability that cannot go anywhere."""
+    """Regions with fewer agents are padded with agents without ability that can only be idle."""
     instance = random_instance(Family(agents=5, tasks=4), 1)
     plan = np.array([0, 0, 0, 2, IDLE])
     regions = lay_out_regions(instance, 1.0, plan, np.array([[0, 1], [2, 3]]), [np.array([0, 1, 2]), np.array([3])])
@@ -54,7 +54,7 @@ def test_padding_agents_can_only_be_idle() -> None:
 
 
 def test_merge_applies_accepted_games() -> None:
-    """Agents of accepted regions go where their slots say; the others stay."""
+    """Agents of accepted regions move to their slots; the others stay."""
     instance = random_instance(Family(agents=5, tasks=4), 1)
     plan = np.array([0, 0, 1, 2, IDLE])
     regions = lay_out_regions(instance, 1.0, plan, np.array([[0, 1], [2, 3]]), [np.array([0, 1, 2]), np.array([3])])
@@ -66,7 +66,7 @@ def test_merge_applies_accepted_games() -> None:
 
 
 def test_padding_does_not_change_a_region() -> None:
-    """Padding agents are neither counted nor seen: observations and rewards are those of the region alone."""
+    """Padding agents are neither counted nor observed: observations and rewards equal those of the region alone."""
     instance = random_instance(Family(agents=40, tasks=6), 2)
     plan = np.array([0, 1, 2, *[3, 4, 5] * 12, IDLE])
     tasks, agents = np.array([[0, 1, 2], [3, 4, 5]]), [np.array([0, 1, 2, 39]), np.arange(3, 39)]

@@ -65,7 +65,7 @@ def test_coverage_matches_hand_calculation(board: Board) -> None:
 
 
 def test_rewards_accept_leading_axes(board: Board) -> None:
-    """Further axes in front are further states of the same games."""
+    """Leading axes are further states of the same games."""
     group = torch.tensor([[[0.5, 2.5, 0.0]], [[2.0, 1.0, 0.0]]])
     for reward in (potential, coverage):
         each = torch.stack([reward(board, one) for one in group])
@@ -79,7 +79,7 @@ def test_utility_matches_hand_calculation(board: Board) -> None:
 
 
 def test_coverage_matches_the_evaluator() -> None:
-    """With equal priorities and workloads > 0, (3) over the number of tasks is the evaluator's reward over it."""
+    """With equal priorities and positive workloads, (3) over the number of tasks equals the evaluator's reward."""
     for seed in range(30):
         instance = tiny_instance(seed)
         if instance.has_travel_time or (instance.workload == 0).any():
@@ -91,7 +91,7 @@ def test_coverage_matches_the_evaluator() -> None:
 
 
 def test_coverage_is_continued_along_its_tangent() -> None:
-    """Beyond `LARGEST_EXPONENT` (3) is continued without a jump or a bend, keeps falling, and never overflows."""
+    """Beyond `LARGEST_EXPONENT` (3) is continued smoothly, keeps falling, and never overflows."""
     board = layout(Instance(ability=[1], workload=[1], tau=0.5))
     limit = LARGEST_EXPONENT / np.log(2)  # mean abilities short at which the exponent is reached
 
@@ -110,7 +110,7 @@ def test_coverage_is_continued_along_its_tangent() -> None:
 
 @given(instances(), st.integers(0, 99), st.sampled_from(RULES))
 def test_marginal_contributions_sum_to_the_increase_of_utility(instance: Instance, seed: int, rules: Rules) -> None:
-    """What granted bids bring is the rise of the utility, and what each brings is that of granting it by itself."""
+    """They sum to the increase of utility, and each equals that of granting its bid alone."""
     board = layout(instance)
     state, generator = reset(board), torch.Generator().manual_seed(seed)
     bids = torch.randn(board.shape, generator=generator).masked_fill(~action_mask(board, state, rules), -torch.inf)
@@ -129,7 +129,7 @@ def test_marginal_contributions_sum_to_the_increase_of_utility(instance: Instanc
 
 
 def test_reserve_and_padding_contribute_nothing(board: Board) -> None:
-    """The reserve and what fills up bring 0, wherever they stand."""
+    """The contribution of the reserve and of padding is 0, at any position."""
     state = reset(board)
     brought = marginal_contributions(board, state, torch.tensor([[9, -1]]))
     assert brought.tolist() == [[0, 0]]
@@ -137,7 +137,7 @@ def test_reserve_and_padding_contribute_nothing(board: Board) -> None:
 
 @given(instances(), st.integers(0, 99), st.sampled_from(RULES))
 def test_difference_rewards_match_brute_force(instance: Instance, seed: int, rules: Rules) -> None:
-    """The reward of an agent is the utility of what all did, less that had it alone stayed."""
+    """An agent's reward is the utility of the joint action minus that if it alone had stayed."""
     board = layout(instance)
     state = step(board, reset(board), somewhere(board, reset(board), rules, seed))
     slot = somewhere(board, state, rules, seed + 1)
@@ -154,7 +154,7 @@ def test_difference_rewards_match_brute_force(instance: Instance, seed: int, rul
 
 @given(instances(speeds=False), st.floats(0.1, 10), st.integers(0, 99))
 def test_makespan_matches_the_evaluator(instance: Instance, hours: float, seed: int) -> None:
-    """Times the reference, it is the makespan of the served tasks; and as many tasks are unserved."""
+    """Times the reference, it is the makespan of the served tasks; the number of unserved tasks is equal."""
     board = layout(instance, hours=hours)
     state = step(board, reset(board), somewhere(board, reset(board), PLANNING, seed))
     time, unserved = relative_makespan(board, state.group)
@@ -165,7 +165,7 @@ def test_makespan_matches_the_evaluator(instance: Instance, hours: float, seed: 
 
 @given(instances(), st.floats(0.1, 10), st.integers(0, 99))
 def test_needs_are_met_iff_makespan_is_within_the_reference(instance: Instance, hours: float, seed: int) -> None:
-    """With travel times too, all needs are met if and only if the makespan is within the reference."""
+    """Also with travel times, all needs are met if and only if the makespan is at most T_ref."""
     board = layout(instance, hours=hours)
     state = step(board, reset(board), somewhere(board, reset(board), PLANNING, seed))
     score = evaluate(instance, plan_of(board, state))
@@ -175,7 +175,7 @@ def test_needs_are_met_iff_makespan_is_within_the_reference(instance: Instance, 
 
 
 def test_last_term_of_the_potential_is_the_makespan() -> None:
-    """1 - T_ref / T of a plan by hand: groups of 3 and 1 for 2 and 2 at T_ref = 1 take 2 h."""
+    """1 - T_ref / T: groups of 3 and 1 for 2 and 2 at T_ref = 1 take 2 h."""
     board = layout(Instance(ability=[2, 1, 1], workload=[2, 2], start_task=[0, 0, 1]))
     assert relative_makespan(board, reset(board).group)[0].item() == 2
     # short: 0 of 2 and 1 of 2, in mean abilities of 4/3; total 1 of 4, on average 1/4, at worst 1/2
@@ -196,7 +196,7 @@ def best_groups(instance: Instance) -> tuple[set[tuple[float, ...]], set[tuple[f
 
 
 def test_coverage_and_makespan_agree_at_balanced_load() -> None:
-    """Where total ability equals total load and can be split without rest, both have one best plan, the same."""
+    """If total ability equals total load and divides without remainder, both have the same unique best plan."""
     by_coverage, by_makespan = best_groups(Instance(ability=[2] * 5, workload=[8, 2]))
     assert by_coverage == by_makespan == {(8.0, 2.0)}
 
@@ -215,7 +215,7 @@ def test_coverage_and_makespan_differ_at_other_loads() -> None:
 
 @pytest.mark.parametrize("reward", list(Reward))
 def test_reward_ranks_plans_by_the_objective(reward: Reward) -> None:
-    """At balanced load the utility of the game is highest at the same plan for both rewards."""
+    """At balanced load the utility is maximal at the same plan for both rewards."""
     board = layout(Instance(ability=[3, 1, 1, 1], workload=[4, 2]), energy_weight=0.0)
     slots = torch.tensor(list(itertools.product(range(2), repeat=4)))
     boards = board[torch.zeros(len(slots), dtype=torch.int64)]
@@ -227,7 +227,7 @@ def test_reward_ranks_plans_by_the_objective(reward: Reward) -> None:
 
 @pytest.mark.parametrize("reward", list(Reward))
 def test_higher_priority_gives_higher_utility(reward: Reward) -> None:
-    """Of two equal tasks without anybody, the agent is utility more at the one of higher priority."""
+    """Of two equal tasks without agents, an agent adds more utility at the one of higher priority."""
     for priority in ([1, 3], [3, 1]):
         instance = Instance(ability=[1, 1], workload=[2, 2], priority=priority)
         board = layout(instance, plan=np.array([-1, -1]))
@@ -240,14 +240,14 @@ def test_higher_priority_gives_higher_utility(reward: Reward) -> None:
 
 @pytest.mark.parametrize("reward", list(Reward))
 def test_equal_priorities_have_no_effect(pair: Instance, reward: Reward) -> None:
-    """Priorities that are all the same, whatever they are, change no reward."""
+    """Any common priority leaves all rewards unchanged."""
     rules = Rules(reward=reward)
     one, other = (layout(instance) for instance in (pair, replace(pair, priority=[5, 5])))
     assert utility(one, reset(one), rules).item() == utility(other, reset(other), rules).item()
 
 
 def test_energy_is_weighted(route: Instance) -> None:
-    """A flight of 3 lowers the utility by its weight times the mean distance: 3 of two agents' here."""
+    """A flight of 3 by one of two agents lowers the utility by the energy weight times 1.5, in scaled units."""
     board = layout(route, energy_weight=0.25)
     unit = board.scale.item()
     bid = torch.tensor([[1]])

@@ -68,7 +68,7 @@ def greedy_matching(board: Board, state: State, bids: np.ndarray, reserve: float
 @pytest.mark.parametrize("reserve", [-np.inf, 0.0, 2.0, 9.0])
 @pytest.mark.parametrize("ties", [False, True])
 def test_grants_are_a_greedy_matching(most: int | None, reserve: float, ties: bool) -> None:
-    """Bids are granted best first, but for those that share a task with one before; equals in order of agents."""
+    """Bids are granted in decreasing order unless they share a task with a granted one; ties in order of agents."""
     for seed in range(8):
         rng = np.random.default_rng([seed, ties])
         family = Family(agents=9, tasks=4, starts="own", communication_range=(0.4, 1.5))
@@ -82,7 +82,7 @@ def test_grants_are_a_greedy_matching(most: int | None, reserve: float, ties: bo
 
 
 def test_batched_games_grant_as_single_ones() -> None:
-    """What other games do changes nothing; games that end sooner are filled up with -1, those that ended with it."""
+    """Other games have no effect; games that end sooner are padded with -1."""
     games = [paper_like(8, 4, 30, seed) for seed in range(4)]
     board, generator = layout(*games), torch.Generator().manual_seed(3)
     state = reset(board)
@@ -100,13 +100,13 @@ def test_batched_games_grant_as_single_ones() -> None:
 
 
 def test_game_ends_without_open_bids(board: Board) -> None:
-    """Where no bid is open the game ends, whatever the reserve: no barred bid is ever granted."""
+    """Without open bids the game ends for any reserve: no masked bid is ever granted."""
     bids = torch.full(board.shape, -torch.inf)
     assert grant_bids(board, reset(board), bids, torch.tensor([-torch.inf])).tolist() == [[9]]
 
 
 def test_bids_are_not_modified(board: Board) -> None:
-    """Granting leaves the bids as they were."""
+    """Granting does not modify the bids."""
     bids = torch.arange(9.0).view(1, 3, 3)
     before = bids.clone()
     grant_bids(board, reset(board), bids, torch.tensor([0.0]))
@@ -114,7 +114,7 @@ def test_bids_are_not_modified(board: Board) -> None:
 
 
 def test_several_agents_may_become_idle_at_once() -> None:
-    """Idleness is no task: any number of agents of different tasks go there in one step."""
+    """Idleness is not a task: any number of agents can become idle in one step."""
     board = layout(Instance(ability=[1, 1, 1], workload=[1, 1, 1], start_task=[0, 1, 2]))
     bids = torch.full(board.shape, -torch.inf)
     bids[0, :, 3] = torch.tensor([3.0, 2.0, 1.0])
@@ -125,7 +125,7 @@ def test_several_agents_may_become_idle_at_once() -> None:
 
 
 def test_most_moves_limits_the_granted_bids(board: Board) -> None:
-    """With `most_moves` 1 the best bid alone is granted, and the reserve is listed only where it is the best."""
+    """With `most_moves` 1 only the best bid is granted, and the reserve is listed only if it is the best."""
     bids = torch.full(board.shape, -torch.inf)
     bids[0, 2, 1], bids[0, 0, 2] = 2.0, 1.0
     assert grant_bids(board, reset(board), bids, torch.tensor([0.0]), 1).tolist() == [[7]]
@@ -133,14 +133,14 @@ def test_most_moves_limits_the_granted_bids(board: Board) -> None:
 
 
 def test_sums_by_place_match_hand_calculation() -> None:
-    """Two games of three agents with two figures each: who is at a place adds up there, and nobody is 0."""
+    """Two games of three agents with two figures each: values at a place are summed, 0 without agents."""
     values = torch.tensor([[[1.0, 10.0], [2.0, 20.0], [4.0, 40.0]], [[1.0, 0.5], [1.0, 0.5], [1.0, 0.5]]])
     sums = sum_by_place(values, torch.tensor([[0, 2, 0], [1, 1, 1]]), 3)
     assert sums.tolist() == [[[5.0, 50.0], [0.0, 0.0], [2.0, 20.0]], [[0.0, 0.0], [3.0, 1.5], [0.0, 0.0]]]
 
 
 def test_step_updates_group_abilities(board: Board) -> None:
-    """A move takes the agent's ability from one task to the other, and nothing else changes."""
+    """A move transfers the agent's ability from one task to the other, and changes nothing else."""
     state = reset(board)
     assert state.group.tolist() == [[2.0, 1.0, 0.0]]
     after = go(board, state, 0, 1, 1)
@@ -150,7 +150,7 @@ def test_step_updates_group_abilities(board: Board) -> None:
 
 
 def test_game_without_moves_ends(board: Board) -> None:
-    """After it has ended, nothing changes any more and nothing is open."""
+    """After it has ended, nothing changes and no bid is open."""
     ended = go(board, reset(board), *board.start[0].tolist())
     assert ended.done.all()
     assert not action_mask(board, ended).any()
@@ -158,7 +158,7 @@ def test_game_without_moves_ends(board: Board) -> None:
 
 
 def test_open_bids_match_hand_calculation(board: Board) -> None:
-    """Agents may go to what is in reach, but where they are; also to being idle."""
+    """Agents may go to reachable tasks except their own, and become idle."""
     assert action_mask(board, reset(board))[0].tolist() == [
         [False, False, True],
         [True, False, True],
@@ -167,7 +167,7 @@ def test_open_bids_match_hand_calculation(board: Board) -> None:
 
 
 def test_agents_do_not_return_to_a_place(board: Board) -> None:
-    """Nobody returns to a place that it left, being idle included, unless the rules let it."""
+    """Agents do not return to places that they have left, idleness included, unless the rules allow it."""
     there = go(board, reset(board), 2, 1, 1)
     back = go(board, there, 2, 1, 2)
     assert action_mask(board, back)[0].tolist() == [[False] * 3, [True, False, True], [False] * 3]
@@ -176,7 +176,7 @@ def test_agents_do_not_return_to_a_place(board: Board) -> None:
 
 
 def test_only_the_final_task_costs_energy(board: Board) -> None:
-    """Going away and back costs nothing: energy is that of the final task, flown directly (19)."""
+    """Returning costs nothing: the energy is that of a direct flight to the final task (19)."""
     start = reset(board)
     there = go(board, start, 0, 1, 1)
     assert mean_distance(board, start).item() == pytest.approx(1.65 * (0 + 0.1 + 0.2) / 3)
@@ -185,7 +185,7 @@ def test_only_the_final_task_costs_energy(board: Board) -> None:
 
 
 def test_hops_match_hand_calculation(route: Instance) -> None:
-    """Agents at 0 fly to 3, 7 and 0: hops of 3, 4 and 7; being idle takes no flight and no agent away."""
+    """Agents at 0 fly to 3, 7 and 0: flights of 3, 4 and 7; becoming idle takes no flight."""
     board = layout(route)
     unit = board.scale.item()
     start = reset(board)
@@ -205,7 +205,7 @@ def test_hops_match_hand_calculation(route: Instance) -> None:
 
 
 def test_remaining_battery_limits_reach(route: Instance) -> None:
-    """After hops of 3 and 4, 4 of 11 are left: enough for 4 back to 3, not for 7 back to 0; 0 of 7 for none."""
+    """After flights of 3 and 4, 4 of 11 are left: enough for 4 back to 3, not for 7 back to 0."""
     board = layout(route)
     state = go(board, go(board, reset(board), 1, 1), 2, 2)
     free = Rules(flying=True, returning=True)
@@ -215,14 +215,14 @@ def test_remaining_battery_limits_reach(route: Instance) -> None:
 
 
 def test_first_flight_counts(board: Board) -> None:
-    """Who starts away from the task that it begins at pays for the way; else staying there were free."""
+    """An agent that starts away from its initial task pays for the flight; otherwise staying would be free."""
     state = reset(board)
     assert state.flown[0].tolist() == pytest.approx([0, 0.165, 0.33])
     assert state.location.tolist() == [[0, 1, 0]]
 
 
 def test_idle_agents_stay_at_their_start() -> None:
-    """Who begins idle, as nothing is in its range, is at its start; from there distances are its own."""
+    """An agent that is idle, as nothing is in its range, is at its start, from which distances count."""
     board = layout(Instance(ability=[1, 1], workload=[1], task_position=[[3, 0]], agent_position=[[0, 0], [3, 0]],
                             communication_range=[1, 1]))  # fmt: skip
     state = reset(board)
@@ -240,7 +240,7 @@ def test_remaining_battery_ignores_unlimited_agents(route: Instance) -> None:
 
 @given(instances(), st.integers(0, 99))
 def test_hops_are_never_shorter_than_the_direct_flight(instance: Instance, seed: int) -> None:
-    """An episode never costs less than its plan, where all places are known; and no battery is overdrawn."""
+    """If all positions are known, an episode costs at least as much as its plan; no battery is overdrawn."""
     board = layout(instance)
     last = played(board, PAPER, seed)[-1]
     if not np.isnan(instance.task_position).any():
@@ -251,7 +251,7 @@ def test_hops_are_never_shorter_than_the_direct_flight(instance: Instance, seed:
 
 @given(instances(), st.integers(0, 99), st.sampled_from([PAPER, PLANNING, FLYING]))
 def test_games_are_reproducible(instance: Instance, seed: int, rules: Rules) -> None:
-    """The same seed plays the same game, bit for bit; abilities are never lost."""
+    """The same seed gives the same game, bit for bit; abilities are conserved."""
     one, other = (played(layout(instance), rules, seed)[-1] for _ in range(2))
     for name in State.__dataclass_fields__:
         assert torch.equal(getattr(one, name), getattr(other, name))

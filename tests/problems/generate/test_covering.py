@@ -5,7 +5,7 @@ from alloc.problems import InputError, machine_covering
 
 
 def test_same_seed_gives_same_instance():
-    """The same seed gives the same instance, another one another instance."""
+    """The same seed gives the same instance, another seed a different one."""
     first, again, other = (machine_covering(12, 4, 1, 100, seed) for seed in (3, 3, 4))
     assert np.array_equal(first.ability, again.ability)
     assert not np.array_equal(first.ability, other.ability)
@@ -31,7 +31,7 @@ def test_real_abilities_are_rarely_integers():
 
 
 def test_restricted_agents_have_few_choices():
-    """With choices, abilities are the same, and agents may take at most that many tasks, one by their number."""
+    """With choices, abilities are the same, and agents may take at most that many tasks, one fixed by their index."""
     free, restricted = machine_covering(20, 6, 1, 9, 0), machine_covering(20, 6, 1, 9, 0, choices=3)
     assert np.array_equal(free.ability, restricted.ability)
     assert free.allowed_tasks is None

@@ -23,7 +23,7 @@ SIZES = {1: (100, 20, 400), 2: (300, 30, 1200), 3: (500, 30, 2400), 4: (500, 50,
 
 @pytest.mark.parametrize("scenario", SIZES)
 def test_paper_scenarios_have_their_sizes_and_totals(scenario: int) -> None:
-    """Sizes and totals are the paper's, abilities whole numbers from 1 to 10, workloads distinct and positive."""
+    """Sizes and totals are the paper's; abilities are integers from 1 to 10, workloads distinct and positive."""
     n, m, total = SIZES[scenario]
     for seed in range(20):
         instance = paper(scenario, seed)
@@ -59,7 +59,7 @@ def test_large_abilities_occur() -> None:
 
 
 def test_same_seed_gives_same_instance() -> None:
-    """The same seed gives the same instance, another one another."""
+    """The same seed gives the same instance, another seed a different one."""
     for make in (lambda seed: paper(2, seed), lambda seed: random_instance(Family(), seed)):
         assert to_document(make(3)) == to_document(make(3))
         assert to_document(make(3)) != to_document(make(4))
@@ -84,7 +84,7 @@ def test_paper_like_instances_of_any_size(data: st.DataObject) -> None:
 @pytest.mark.parametrize("workload", ["equal", "uniform", "lognormal", "pareto", "dirichlet"])
 @pytest.mark.parametrize("integer", [True, False])
 def test_load_is_met(ability: str, workload: str, integer: bool) -> None:
-    """Total workload over total ability is the load asked for, whatever the distributions."""
+    """Total workload over total ability is the given load for any distributions."""
     family = Family(agents=200, tasks=30, ability=ability, workload=workload, integer=integer, load=0.8)
     instance = random_instance(family, 5)
     expected = 0.8 * instance.ability.sum()
@@ -114,7 +114,7 @@ def test_ability_distributions_respect_their_limits() -> None:
 @pytest.mark.parametrize("sites", ["uniform", "clustered"])
 @pytest.mark.parametrize("starts", ["tasks", "own", "depots", "unknown"])
 def test_positions_are_in_the_world(dimensions: int, sites: str, starts: str) -> None:
-    """Sites and starts are in the world, with the given dimensions, depots or tasks."""
+    """Sites and starts are in the world, with the given dimensions, at depots or tasks."""
     family = Family(dimensions=dimensions, sites=sites, starts=starts, world_size=50, depots=3)
     instance = random_instance(family, 2)
     for positions in (instance.task_position, instance.start_position):
@@ -130,7 +130,7 @@ def test_positions_are_in_the_world(dimensions: int, sites: str, starts: str) ->
 
 
 def test_clusters_are_denser() -> None:
-    """The nearest neighbour is much nearer among clustered sites."""
+    """Clustered sites have much nearer neighbours."""
 
     def nearest(sites: str) -> float:
         places = random_instance(Family(tasks=100, sites=sites), 3).task_position
@@ -216,7 +216,7 @@ def test_invalid_scenarios_seeds_and_totals_are_refused(make: Any, place: str) -
 
 
 def test_a_hundred_thousand_agents() -> None:
-    """Large whole-number instances keep their exact total, heavy tails included."""
+    """Large integer instances have their exact total, also with heavy tails."""
     instance = random_instance(Family(agents=100_000, tasks=200, ability="pareto", starts="own"), 0)
     assert isinstance(instance, Instance)
     assert instance.workload.sum() == instance.ability.sum()
