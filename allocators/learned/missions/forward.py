@@ -58,15 +58,16 @@ def add_context(
     token: Singles, count: int, largest: np.float32, weights: MissionWeights, pooled: Singles, attention: Singles
 ) -> None:
     """Write the pooled token, and its contribution to each option, into the two rows of `pooled`."""
-    pooled[0, :] = F(0)
-    total = F(0)
+    mean, context, total = pooled[0], pooled[1], F(0)
+    mean[:] = F(0)
     for row in range(count):
         share = np.exp(attention[row] - largest)
         total += share
+        hidden = token[row]
         for k in range(HIDDEN):
-            pooled[0, k] += share * token[row, k]
+            mean[k] += share * hidden[k]
     for k in range(HIDDEN):
         value = F(0)
         for j in range(HIDDEN):
-            value += pooled[0, j] * weights.context[j * HIDDEN + k]
-        pooled[1, k] = weights.own_bias[k] + value / total
+            value += mean[j] * weights.context[j * HIDDEN + k]
+        context[k] = weights.own_bias[k] + value / total

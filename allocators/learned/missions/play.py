@@ -175,7 +175,7 @@ def note_choice(room: Room, row: int, choice: int) -> None:
         room.news[row] = 1
 
 
-@compiled_in_place
+@inlined
 def talk(state: MissionArrays, room: Room) -> None:
     """Set which agents send a message now."""
     head = state.head[0]
