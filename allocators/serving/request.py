@@ -1,12 +1,11 @@
 """Parsing and validation of requests to a service, from documents to arguments of `solve`."""
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 from alloc.allocators.contract.parameters import CheckedParameters, bounded
 from alloc.problems import InputError, Instance
-from alloc.problems.arguments import of_type, real, shown, text, whole
+from alloc.problems.arguments import real, shown, text, whole
 from alloc.problems.formats.document import from_document
 from alloc.problems.formats.json_columns import Row, require_known
 from alloc.problems.formats.json_text import require_object
@@ -16,10 +15,16 @@ REQUEST_FORMAT, ANSWER_FORMAT = "alloc-solve-request/1", "alloc-solve-answer/1"
 ARGUMENTS = ("objective", "target_gap", "start", "makespan_slack", "makespan_limit", "move_price", "pins")
 """Fields that are passed to `solve` under the same name and validated there."""
 
-COUNTS = ("iterations", "seed", "threads")
-"""Fields with integer values."""
+OBJECTS = ("start", "pins")
+"""Fields that are passed to `solve` and must be objects."""
 
-FIELDS = ("format", "id", "instance", "method", "parameters", "limit_ms", *ARGUMENTS, *COUNTS)
+COUNTS = {"iterations": 0, "seed": 0, "threads": 1}
+"""Fields with integer values, and their minimum."""
+
+OPTIONAL = ("parameters", *ARGUMENTS, *COUNTS)
+"""Fields that may be null, as if they were not given."""
+
+FIELDS = ("format", "id", "instance", "method", "limit_ms", *OPTIONAL)
 
 LOCAL_PARAMETERS = ("policy", "device", "plain")
 """Parameters of built-in methods that untrusted clients may not set: they name files or hardware, or allow models of
@@ -94,17 +99,20 @@ class SolveRequest:
             raise InputError(f"must be {REQUEST_FORMAT}, got {shown(row['format'])}", "format")
         if row.get("id") is not None:
             identity(row["id"], "id")
-        counts = {
-            name: whole(integral(row[name]), name, 0, LARGEST_WHOLE) for name in COUNTS if row.get(name) is not None
-        }
-        given = {name: row[name] for name in ARGUMENTS if row.get(name) is not None}
+        given = {name: row[name] for name in OPTIONAL if row.get(name) is not None}
+        for name in OBJECTS:
+            require_object(given.get(name, {}), name)
+        for name, least in COUNTS.items():
+            if name in given:
+                given[name] = whole(integral(given[name]), name, least, LARGEST_WHOLE)
+        parameters = _parameters(require_object(given.pop("parameters", {}), "parameters"), limits)
         limit_ms = limits.limit_ms if row.get("limit_ms") is None else row["limit_ms"]
         return cls(
             instance=_instance(row.get("instance"), limits),
             method=text(row.get("method", "auto"), "method"),
-            parameters=_parameters(row.get("parameters") or {}, limits),
+            parameters=parameters,
             limit_s=real(limit_ms, "limit_ms", high=limits.limit_ms) / 1000,
-            arguments={**given, **counts},
+            arguments=given,
         )
 
 
@@ -144,9 +152,9 @@ def _instance(given: object, limits: ServiceLimits) -> Instance:
         raise InputError(error.message, f"instance.{error.place}" if error.place else "instance") from error
 
 
-def _parameters(given: object, limits: ServiceLimits) -> dict[str, object]:
+def _parameters(given: dict[str, object], limits: ServiceLimits) -> dict[str, object]:
     """Return the parameters of the method as Python values."""
-    named = {str(name): _value(value) for name, value in of_type(given, Mapping, "parameters").items()}
+    named = {name: _value(value) for name, value in given.items()}
     for name, value in named.items() if limits.strangers else ():
         if name in LOCAL_PARAMETERS:
             raise InputError("cannot be set by requests to this service", f"parameters.{name}")

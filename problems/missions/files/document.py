@@ -246,9 +246,11 @@ def _whole(header: Row, name: str) -> int:
     value = header.get(name)
     if value is None:
         return 0
-    if isinstance(value, bool) or not isinstance(value, int | float) or value != math.floor(value):
+    if isinstance(value, float) and value.is_integer():  # not NaN or infinity
+        return int(value)
+    if isinstance(value, bool) or not isinstance(value, int):
         raise InputError(f"must be a whole number >= 0, got {described(value)}", name)
-    return int(value)
+    return value
 
 
 def _made(kind: Callable[..., Made], given: object, place: str, known: Sequence[str]) -> Made | None:

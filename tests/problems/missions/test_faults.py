@@ -2,6 +2,7 @@
 
 import copy
 import json
+import math
 
 import pytest
 
@@ -98,3 +99,9 @@ def test_number_of_reported_faults_is_limited():
     before = copy.deepcopy(document)
     assert len(places(document)) == MOST_FAULTS
     assert document == before
+
+
+@pytest.mark.parametrize("seed", [math.nan, math.inf, 1.5, -1, True, "1", 2**63])
+def test_a_seed_is_a_whole_number(seed):
+    """Also NaN and infinity, which JSON of Python and of numpy may hold, are an error at `seed`."""
+    assert places({**GOOD, "seed": seed}) == ["seed"]
