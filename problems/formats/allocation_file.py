@@ -97,6 +97,8 @@ def read_plan(path: PathLike, instance: Instance) -> PlanFile:
     """
     source = named(path)
     of_type(instance, Instance, "instance")
+    if source.lower().endswith(".xlsx"):
+        raise InputError("is a workbook; give the plan as .json, or save its sheet of agents as .csv", source=source)
     try:
         return PlanFile(source, _document(read_text(path), source, instance))
     except InputError as error:

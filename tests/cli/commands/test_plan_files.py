@@ -102,6 +102,14 @@ def test_invalid_table_is_one_line(alloc, small, text, message):
         assert ran.err.startswith(f"alloc: {message}")
 
 
+def test_a_workbook_is_no_plan(alloc, small):
+    """A plan in a workbook, as solve writes it, is refused with what to give instead."""
+    alloc("solve", "small.json", "--method", "greedy", "--output", "plan.xlsx", "-q")
+    ran = alloc("evaluate", "small.json", "plan.xlsx")
+    told = "alloc: plan.xlsx: is a workbook; give the plan as .json, or save its sheet of agents as .csv\n"
+    assert (ran.code, ran.out, ran.err) == (2, "", told)
+
+
 def test_result_without_a_plan_is_drawn(alloc, small):
     """A result without an allocation is drawn as a message, and is not a plan for other commands."""
     result = alloc("solve", "small.json", "--method", "greedy", "--json").json

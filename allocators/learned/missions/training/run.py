@@ -15,7 +15,7 @@ from alloc.allocators.learned.training.report import Report
 from alloc.allocators.parallel.engine import Engine, never_stop
 from alloc.problems import InputError
 from alloc.problems.arguments import whole
-from alloc.problems.errors import nearest
+from alloc.problems.errors import of_these
 from alloc.problems.missions.mission import Mission
 
 DEFAULT_GENERATIONS = 150
@@ -123,6 +123,5 @@ def _families(names: Sequence[str]) -> tuple[str, ...]:
         return FAMILIES
     for name in names:
         if name not in FAMILIES:
-            known = ["mixed", *FAMILIES]
-            raise InputError(f"there is no family {name!r}{nearest(name, known)}; use {', '.join(known)}", "missions")
+            raise InputError(f"there is no family {name!r}{of_these(name, ('mixed', *FAMILIES))}", "missions")
     return tuple(names)
