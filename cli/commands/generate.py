@@ -26,8 +26,12 @@ EXAMPLES = examples(
 )
 
 SEED = Annotated[int, typer.Option(min=0, help="Random seed; with --count, the first of several.")]
+FIXED = ("family", "seed", "count", "output")
+"""Arguments and options that apply to all families."""
+
+SIZES = ("agents", "tasks")
 SPREADS = ("communication_range", "battery", "speed", "priority")
-COVERING = ("agents", "tasks", "ability_min", "ability_max", "workload", "integer", "choices")
+COVERING = (*SIZES, "ability_min", "ability_max", "workload", "integer", "choices")
 MISSION = {
     "agents": "agents",
     "tasks": "tasks",
@@ -138,19 +142,18 @@ def _check_folder(output: str) -> None:
 
 def _check_options(family: Family, wanted: dict[str, Any]) -> None:
     """Raise an error for an option that does not apply to this family."""
+    taken = {Family.COVERING: COVERING, Family.CFSTP: SIZES, Family.MISSION: MISSION}.get(family, ())
     for name in wanted:
-        owner = "mission" if name in MISSION and name not in ("agents", "tasks") else "random"
-        owner = "covering" if name == "choices" else owner
-        taken = {
-            Family.RANDOM: name in ("agents", "tasks") or owner == "random",
-            Family.COVERING: name in COVERING,
-            Family.CFSTP: name in ("agents", "tasks"),
-        }
-        if not taken.get(family, family is Family.MISSION and name in MISSION):
+        owner = _owner(name)
+        if name not in taken and not (family is Family.RANDOM and (name in SIZES or owner is Family.RANDOM)):
             raise typer.BadParameter(f"is for {owner}, not for {family}", param_hint=f"'{_flag(name)}'")
 
 
-FIXED = ("family", "seed", "count", "output")
+def _owner(name: str) -> Family:
+    """Return the family that an option is mainly for."""
+    if name == "choices":
+        return Family.COVERING
+    return Family.MISSION if name in MISSION and name not in SIZES else Family.RANDOM
 
 
 def _instance(family: Family, wanted: dict[str, Any], seed: int) -> "Instance | Mission":
