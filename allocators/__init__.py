@@ -15,7 +15,8 @@ from alloc.allocators.contract.search import Search
 from alloc.allocators.contract.status import Status
 from alloc.allocators.contract.tolerance import MakespanTolerance
 from alloc.allocators.experiments.compare import Row, compare
-from alloc.allocators.experiments.whatif import Fleet, WhatIf, whatif
+from alloc.allocators.experiments.fleets import Fleet
+from alloc.allocators.experiments.whatif import WhatIf, whatif
 from alloc.allocators.explain import Bottleneck, explain
 from alloc.allocators.pareto import Front, pareto
 from alloc.allocators.registry import TARGETS, describe, describe_parameters, load, method_parameters, names

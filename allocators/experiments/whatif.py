@@ -9,7 +9,7 @@ from itertools import count
 
 from alloc.allocators.contract.base import Allocator
 from alloc.allocators.contract.budget import Budget
-from alloc.allocators.experiments.whatif_answer import answer
+from alloc.allocators.experiments.fleets import Fleet, answer
 from alloc.allocators.registry import load
 from alloc.allocators.request import checked_objective
 from alloc.allocators.result import Result
@@ -26,23 +26,6 @@ FIELDS = (
     "unserved_tasks", "runtime_s", "assignment",
 )  # fmt: skip
 """Fields of a result that each fleet includes."""
-
-
-@dataclass(frozen=True, eq=False)
-class Fleet:
-    """A fleet and its plan.
-
-    Attributes
-    ----------
-    added, removed : tuple of str
-        Ids of the agents that it has in addition to, and lacks compared with, the instance.
-    result : Result
-        Result on the instance with this fleet.
-    """
-
-    added: tuple[str, ...]
-    removed: tuple[str, ...]
-    result: Result
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +51,7 @@ class WhatIf:
     @property
     def answer(self) -> str:
         """One sentence on the effect of the first change and of the last."""
-        return answer([(len(fleet.added), fleet.removed, fleet.result) for fleet in self.fleets], self.like)
+        return answer(self.fleets, self.like)
 
     def to_dict(self) -> dict[str, object]:
         """Return the fields of the format `alloc-whatif/1`, ready for JSON.

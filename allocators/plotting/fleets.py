@@ -13,7 +13,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from alloc.allocators.experiments.whatif import Fleet, WhatIf
+    from alloc.allocators.experiments.fleets import Fleet
+    from alloc.allocators.experiments.whatif import WhatIf
 
 MOST_LABELS = 12
 """Maximum number of fleets of which each is labelled below its bar."""

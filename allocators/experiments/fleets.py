@@ -1,14 +1,12 @@
-"""One-sentence summary of a comparison of fleets."""
+"""Fleets with their plans, and a one-sentence summary of how they compare."""
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 from alloc.allocators.contract.tolerance import PROVEN
 from alloc.allocators.result import Result
 from alloc.problems.text import counted, number
-
-FleetFigures = tuple[int, tuple[str, ...], Result]
-"""Number of added agents, ids of removed agents, and the result."""
 
 FEWEST_DIGITS = 4
 """Minimum number of significant digits of a makespan; more are used to distinguish two."""
@@ -17,12 +15,29 @@ MOST_NAMES = 3
 """Maximum number of ids of agents that are listed; more are given as a number."""
 
 
-def answer(fleets: Sequence[FleetFigures], like: Sequence[str]) -> str:
+@dataclass(frozen=True, eq=False)
+class Fleet:
+    """A fleet and its plan.
+
+    Attributes
+    ----------
+    added, removed : tuple of str
+        Ids of the agents that it has in addition to, and lacks compared with, the instance.
+    result : Result
+        Result on the instance with this fleet.
+    """
+
+    added: tuple[str, ...]
+    removed: tuple[str, ...]
+    result: Result
+
+
+def answer(fleets: Sequence[Fleet], like: Sequence[str]) -> str:
     """Return the effect of the first and last change on the current fleet, and which additions offset a loss.
 
     Parameters
     ----------
-    fleets : sequence of FleetFigures
+    fleets : sequence of Fleet
         The first is the current fleet.
     like : sequence of str
         Agents that are copied, one of each per step.
@@ -32,18 +47,19 @@ def answer(fleets: Sequence[FleetFigures], like: Sequence[str]) -> str:
     str
         Such as ``one more like d2: 4.1 instead of 4.6 (-11 %)``.
     """
-    now = fleets[0][2]
-    changed = [fleet for fleet in fleets[1:] if fleet[0]]
-    dropped = next((fleet for fleet in fleets[1:] if not fleet[0]), None)
+    now = fleets[0].result
+    changed = [fleet for fleet in fleets[1:] if fleet.added]
+    dropped = next((fleet for fleet in fleets[1:] if not fleet.added), None)
     parts = []
     if dropped is not None:
-        parts.append(f"without {_listed(dropped[1])}: {_change(dropped[2], now)}")
+        parts.append(f"without {_listed(dropped.removed)}: {_change(dropped.result, now)}")
     for fleet in [*changed[:1], *changed[1:][-1:]]:
-        parts.append(f"{_more(fleet[0] // len(like), like)}: {_change(fleet[2], now, short=bool(parts))}")
-    if dropped is not None and _is_worse(dropped[2], now):
-        enough = next((fleet for fleet in changed if not _is_worse(fleet[2], now)), None)
+        steps = len(fleet.added) // len(like)
+        parts.append(f"{_more(steps, like)}: {_change(fleet.result, now, short=bool(parts))}")
+    if dropped is not None and _is_worse(dropped.result, now):
+        enough = next((fleet for fleet in changed if not _is_worse(fleet.result, now)), None)
         if enough is not None:
-            steps = enough[0] // len(like)
+            steps = len(enough.added) // len(like)
             parts.append(f"{_more(steps, like)} {'makes' if steps == 1 else 'make'} up for it")
     return "; ".join(parts) if parts else "interrupted before a fleet was changed"
 
