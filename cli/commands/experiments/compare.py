@@ -1,14 +1,13 @@
 """``alloc compare``."""
 
 import threading
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from alloc.cli import options
 from alloc.cli.commands.experiments import options as store_options
-from alloc.cli.commands.experiments.missions import compare_missions
+from alloc.cli.commands.experiments.missions import MissionRuns, compare_missions
 from alloc.cli.commands.experiments.sources import gather
 from alloc.cli.options import examples
 from alloc.cli.output.console import note, say, table
@@ -18,7 +17,7 @@ from alloc.problems.text import heading, labelled, number, percent
 from alloc.problems.vocabulary import Knowledge
 
 if TYPE_CHECKING:
-    from alloc.allocators import Allocator, Budget
+    from alloc.allocators import Allocator
     from alloc.allocators.experiments.compare import Row
     from alloc.problems import Units
 
@@ -119,17 +118,17 @@ def compare_command(
         "--objective": None if objective is options.PlainObjective.MAKESPAN else objective,
     }
     _check_kind(methods, policies, of_methods, {"--knowledge": knowledge, "--deadline-ms": deadline_ms})
-    numbers = _seeds(seeds)
+    outputs = store_options.Outputs(csv, json)
     if policies is not None:
         listed = options.listed(policies, "--policies")
-        asked_of = (instances, listed, numbers, knowledge, deadline_ms or None, csv)
-        raise typer.Exit(compare_missions(storage, *asked_of, json=json))
+        mission_runs = MissionRuns(instances, listed, _seeds(seeds), knowledge, deadline_ms or None)
+        raise typer.Exit(compare_missions(storage, mission_runs, outputs))
     assert methods is not None
     budget = Budget(options.time_limit(time_limit, iterations), iterations, target_gap)
+    runs = store_options.MethodRuns(instances, _seeds(seeds), objective.value, budget, threads)
     if storage is not None:
-        asked = (instances, methods, numbers, objective, budget, threads, csv)
-        raise typer.Exit(_compare_in_store(storage, *asked, json=json))
-    raise typer.Exit(_compare(instances, _methods(methods), numbers, objective, budget, threads, csv, json=json))
+        raise typer.Exit(_compare_in_store(storage, methods, runs, outputs))
+    raise typer.Exit(_compare(_methods(methods), runs, outputs))
 
 
 def _check_kind(
@@ -147,69 +146,54 @@ def _check_kind(
 
 def _compare_in_store(
     storage: store_options.StoreOptions,
-    files: Sequence[str],
     methods: str,
-    seeds: list[int],
-    objective: options.PlainObjective,
-    budget: "Budget",
-    threads: int | None,
-    csv: str | None,
-    *,
-    json: bool,
+    runs: store_options.MethodRuns,
+    outputs: store_options.Outputs,
 ) -> int:
     """Make the runs that are missing in the store, print the rows of all runs, and return the exit code."""
     from alloc.cli.commands.experiments.stored import compare_in_store, conclude
     from alloc.problems import Instance
-    from alloc.problems.formats import is_standard_output
     from alloc.problems.units import common_units
 
     variants = {
         label: (name, settings or {}) for label, (name, settings) in options.listed(methods, "--methods").items()
     }
-    found, rows = compare_in_store(storage, files, variants, seeds, objective.value, budget, threads)
+    found, rows = compare_in_store(storage, variants, runs)
     units = common_units([one.units for one in found.comparison.instances if isinstance(one, Instance)])
-    _write(rows, csv, units, json=json)
-    return conclude(storage, found, rows, quiet=json or (csv is not None and is_standard_output(csv)))
+    _write(rows, outputs, units)
+    return conclude(storage, found, rows, quiet=outputs.is_standard_output_taken())
 
 
 def _compare(
-    files: Sequence[str],
-    methods: "dict[str, str | Allocator]",
-    seeds: list[int],
-    objective: options.PlainObjective,
-    budget: "Budget",
-    threads: int | None,
-    csv: str | None,
-    *,
-    json: bool,
+    methods: "dict[str, str | Allocator]", runs: store_options.MethodRuns, outputs: store_options.Outputs
 ) -> int:
     """Run the methods on all instances, print the rows, and return the exit code."""
     from alloc.allocators.experiments.compare import compare, share_bounds
     from alloc.allocators.runtime.interrupts import signals_set
     from alloc.problems.units import common_units
 
-    problems = gather(files)
+    problems = gather(runs.sources)
     units = common_units([problem.units for problem in problems])
     stop, rows, total = threading.Event(), list["Row"](), len(problems) * len(methods)
     with signals_set(stop):
         for row in compare(
             problems,
             methods,
-            seeds,
-            objective=objective.value,
-            time_limit_s=budget.time_limit_s,
-            iterations=budget.iterations,
-            target_gap=budget.target_gap,
-            threads=threads,
+            runs.seeds,
+            objective=runs.objective,
+            time_limit_s=runs.budget.time_limit_s,
+            iterations=runs.budget.iterations,
+            target_gap=runs.budget.target_gap,
+            threads=runs.threads,
             stop=stop,
         ):
             rows.append(row)
             outcome = row.reason or f"T {labelled(number(row.makespan_mean), units.time)}, gap {percent(row.gap_mean)}"
             show_done(f"{row.instance}, {row.method}: {outcome}", len(rows), total)
-    _write(share_bounds(rows), csv, units, json=json)
+    _write(share_bounds(rows), outputs, units)
     if stop.is_set():
         note(f"interrupted after {len(rows)} of {total} rows")
-    complete = len(rows) == total and all(row.reason or row.runs == len(seeds) for row in rows)
+    complete = len(rows) == total and all(row.reason or row.runs == len(runs.seeds) for row in rows)
     served = any(row.runs for row in rows) and not any(row.unserved for row in rows)
     return 0 if complete and served else 1
 
@@ -239,9 +223,9 @@ def _seeds(text: str) -> list[int]:
     return list(range(int(text)))
 
 
-def _write(rows: "list[Row]", csv: str | None, units: "Units", *, json: bool) -> None:
+def _write(rows: "list[Row]", outputs: store_options.Outputs, units: "Units") -> None:
     document: dict[str, object] = {"format": "alloc-comparison/1", "rows": [row.to_dict() for row in rows]}
-    write_rows(document, _columns(), csv, lambda: _tell(rows, units), json=json)
+    write_rows(document, _columns(), outputs.csv, lambda: _tell(rows, units), json=outputs.json)
 
 
 def _tell(rows: "list[Row]", units: "Units") -> None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING
 
-from alloc.cli.commands.experiments.options import StoreOptions
+from alloc.cli.commands.experiments.options import Outputs, StoreOptions
 from alloc.cli.commands.experiments.sources import gather_missions
 from alloc.cli.commands.experiments.stored import make_missing
 from alloc.cli.output.console import note, say, table
@@ -26,38 +26,38 @@ Listed = Mapping[str, tuple[str, dict[str, object] | None]]
 """Name and parameters of each policy, by its label on the command line."""
 
 
-def compare_missions(
-    storage: StoreOptions | None,
-    files: Sequence[str],
-    policies: Listed,
-    seeds: list[int],
-    knowledge: Knowledge | None,
-    deadline_ms: float | None,
-    csv: str | None,
-    *,
-    json: bool,
-) -> int:
+@dataclass(frozen=True)
+class MissionRuns:
+    """Runs of policies: on which missions, with which seeds, and how each is made."""
+
+    sources: Sequence[str]
+    policies: Listed
+    seeds: Sequence[int]
+    knowledge: Knowledge | None
+    deadline_ms: float | None
+
+
+def compare_missions(storage: StoreOptions | None, runs: MissionRuns, outputs: Outputs) -> int:
     """Run the policies on all missions, print the rows, and return the exit code."""
     from alloc.allocators import describe_policy
     from alloc.allocators.experiments.differences import paired_differences
     from alloc.problems.units import common_units
 
-    for name, _ in policies.values():
+    for name, _ in runs.policies.values():
         describe_policy(name)
-    missions = gather_missions(files)
+    missions = gather_missions(runs.sources)
     units = common_units([mission.instance.units for mission in missions])
-    asked = (missions, policies, seeds, knowledge, deadline_ms)
-    found = _in_store(storage, *asked) if storage is not None else _at_once(*asked, units)
+    found = _at_once(missions, runs, units) if storage is None else _in_store(storage, missions, runs)
     differences = paired_differences(found.rows)
     document: dict[str, object] = {
         "format": "alloc-mission-comparison/1",
         "rows": [row.to_dict() for row in found.rows],
         "differences": [one.to_dict() for one in differences],
     }
-    write_rows(document, _columns(), csv, lambda: _tell(found.rows, differences, units), json=json)
+    write_rows(document, _columns(), outputs.csv, lambda: _tell(found.rows, differences, units), json=outputs.json)
     for one in found.notes:
         note(one)
-    complete = found.is_complete and all(row.reason or row.runs == len(seeds) for row in found.rows)
+    complete = found.is_complete and all(row.reason or row.runs == len(runs.seeds) for row in found.rows)
     done = any(row.runs for row in found.rows) and all(row.statuses in ("done", "") for row in found.rows)
     return 0 if complete and done else 1
 
@@ -71,14 +71,7 @@ class _Found:
     notes: list[str]
 
 
-def _at_once(
-    missions: "list[Mission]",
-    policies: Listed,
-    seeds: list[int],
-    knowledge: Knowledge | None,
-    deadline_ms: float | None,
-    units: "Units",
-) -> _Found:
+def _at_once(missions: "list[Mission]", runs: MissionRuns, units: "Units") -> _Found:
     """Make all runs in this process."""
     from alloc.allocators import load_policy
     from alloc.allocators.experiments.policies import compare_policies
@@ -86,25 +79,20 @@ def _at_once(
 
     leaders = {
         label: name if settings is None else load_policy(name, **settings)
-        for label, (name, settings) in policies.items()
+        for label, (name, settings) in runs.policies.items()
     }
     stop, rows, total = threading.Event(), list["PolicyRow"](), len(missions) * len(leaders)
     with signals_set(stop):
-        for row in compare_policies(missions, leaders, seeds, knowledge=knowledge, deadline_ms=deadline_ms, stop=stop):
+        for row in compare_policies(
+            missions, leaders, runs.seeds, knowledge=runs.knowledge, deadline_ms=runs.deadline_ms, stop=stop
+        ):
             rows.append(row)
             show_done(f"{row.mission}, {row.policy}: {_outcome(row, units)}", len(rows), total)
     notes = [f"interrupted after {len(rows)} of {total} rows"] if stop.is_set() else []
     return _Found(rows, len(rows) == total, notes)
 
 
-def _in_store(
-    storage: StoreOptions,
-    missions: "list[Mission]",
-    policies: Listed,
-    seeds: list[int],
-    knowledge: Knowledge | None,
-    deadline_ms: float | None,
-) -> _Found:
+def _in_store(storage: StoreOptions, missions: "list[Mission]", runs: MissionRuns) -> _Found:
     """Make the runs that are missing in the store, write the reports, and return the rows of all runs."""
     from alloc.allocators import load_policy
     from alloc.allocators.experiments.report.files import write_report
@@ -112,15 +100,21 @@ def _in_store(
     from alloc.allocators.experiments.stored_missions import planned_missions, policy_rows
     from alloc.problems import MissingPackageError
 
-    for name, settings in policies.values():
+    for name, settings in runs.policies.values():
         if settings:
             with contextlib.suppress(MissingPackageError):  # reported by its runs; other errors are raised now
                 load_policy(name, **settings)
-    variants = {label: (name, settings or {}) for label, (name, settings) in policies.items()}
+    variants = {label: (name, settings or {}) for label, (name, settings) in runs.policies.items()}
 
     def plan(store: "Store", machine: str) -> "Comparison":
         return planned_missions(
-            store, missions, variants, seeds, knowledge=knowledge, deadline_ms=deadline_ms, machine=machine
+            store,
+            missions,
+            variants,
+            runs.seeds,
+            knowledge=runs.knowledge,
+            deadline_ms=runs.deadline_ms,
+            machine=machine,
         )
 
     stored = make_missing(storage, plan)

@@ -1,11 +1,15 @@
-"""Options of ``alloc compare`` for comparisons with a store."""
+"""Options of ``alloc compare``: of runs, outputs, and a store."""
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
+
+if TYPE_CHECKING:
+    from alloc.allocators import Budget
 
 SIZE = re.compile(r"(\d+(?:\.\d+)?)\s*([MG])i?B?", re.IGNORECASE)
 """Pattern of an amount of memory, such as 800M or 4G."""
@@ -74,6 +78,31 @@ AddressOption = Annotated[
         help="Address of the cluster, for --engine ray.", show_default="RAY_ADDRESS, else the cluster on this machine"
     ),
 ]
+
+
+@dataclass(frozen=True)
+class MethodRuns:
+    """Runs of methods: on which instances, with which seeds, and how each is made."""
+
+    sources: Sequence[str]
+    seeds: Sequence[int]
+    objective: str
+    budget: "Budget"
+    threads: int | None
+
+
+@dataclass(frozen=True)
+class Outputs:
+    """Where the rows of a comparison go: to a CSV file, and as JSON to standard output."""
+
+    csv: str | None
+    json: bool
+
+    def is_standard_output_taken(self) -> bool:
+        """Return whether the rows go to standard output, so that no table is printed."""
+        from alloc.problems.formats import is_standard_output
+
+        return self.json or (self.csv is not None and is_standard_output(self.csv))
 
 
 @dataclass(frozen=True)

@@ -8,13 +8,12 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING
 
-from alloc.cli.commands.experiments.options import Engine, StoreOptions
+from alloc.cli.commands.experiments.options import Engine, MethodRuns, StoreOptions
 from alloc.cli.commands.experiments.sources import gather
 from alloc.cli.output.console import is_terminal, note, say, table
 from alloc.problems.text import counted, number
 
 if TYPE_CHECKING:
-    from alloc.allocators import Budget
     from alloc.allocators.experiments.compare import Row
     from alloc.allocators.experiments.isolation.places import Place
     from alloc.allocators.experiments.store.key import Run
@@ -92,13 +91,7 @@ def _place(storage: StoreOptions) -> "Place":
 
 
 def compare_in_store(
-    storage: StoreOptions,
-    sources: Sequence[str],
-    methods: Mapping[str, tuple[str, Mapping[str, object]]],
-    seeds: Sequence[int],
-    objective: str,
-    budget: "Budget",
-    threads: int | None,
+    storage: StoreOptions, methods: Mapping[str, tuple[str, Mapping[str, object]]], runs: MethodRuns
 ) -> "tuple[StoredComparison, list[Row]]":
     """Compare methods, and return the outcome and its rows, with gaps to the best bound of any method."""
     from alloc.allocators.experiments.compare import share_bounds
@@ -106,17 +99,17 @@ def compare_in_store(
 
     for name, settings in methods.values():
         _check_method(name, settings)
-    instances = gather(list(sources))
+    instances = gather(runs.sources)
 
     def plan(store: "Store", machine: str) -> "Comparison":
         return planned(
             store,
             instances,
             methods,
-            seeds,
-            objective=objective,
-            budget=budget,
-            threads=threads,
+            runs.seeds,
+            objective=runs.objective,
+            budget=runs.budget,
+            threads=runs.threads,
             machine=machine,
         )
 
