@@ -22,7 +22,7 @@ from alloc.allocators.solve import solve
 from alloc.problems import InputError, RefusedError
 from alloc.problems.formats.json_columns import Row
 from alloc.problems.formats.json_text import parse, require_object
-from alloc.problems.formats.messages import one_line
+from alloc.problems.formats.messages import message_line
 
 LOG = logging.getLogger("alloc.serve")
 
@@ -235,7 +235,7 @@ class Service:
 
 def failure(given: str | Row, outcome: Outcome, message: str) -> Answer:
     """Return the answer to a request without a result."""
-    return Answer(outcome, {**_head(given), "error": {"kind": str(outcome), "message": one_line(message)}})
+    return Answer(outcome, {**_head(given), "error": {"kind": str(outcome), "message": message_line(message)}})
 
 
 def _head(given: str | Row) -> Row:

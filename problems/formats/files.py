@@ -9,7 +9,7 @@ from pathlib import Path
 
 from alloc.problems.arguments import of_type
 from alloc.problems.errors import InputError
-from alloc.problems.formats.messages import one_line, reason, unwritable
+from alloc.problems.formats.messages import message_line, reason, unwritable
 
 STANDARD_STREAM = "-"
 
@@ -36,7 +36,7 @@ def named(path: PathLike, *, output: bool = False) -> str:
     text = os.fspath(path)
     if text == STANDARD_STREAM:
         return "standard output" if output else "standard input"
-    return one_line(text, 4096) or "''"
+    return message_line(text, 4096) or "''"
 
 
 def is_stream(path: PathLike) -> bool:

@@ -30,7 +30,7 @@ def quoted(text: str) -> str:
     return repr(text if len(text) <= LONGEST_NAME else text[: LONGEST_NAME - 3] + "...")
 
 
-def one_line(text: str, longest: int = LONGEST_MESSAGE) -> str:
+def message_line(text: str, longest: int = LONGEST_MESSAGE) -> str:
     """Return `text` without line breaks and other control characters, with its middle cut out if it is long."""
     if len(text) > longest:
         text = f"{text[: longest - 100]} ... {text[-90:]}"
@@ -39,14 +39,14 @@ def one_line(text: str, longest: int = LONGEST_MESSAGE) -> str:
 
 def told(error: InputError, source: str) -> InputError:
     """Return the error with its source, as a one-line message."""
-    place = one_line(error.place, 100 + LONGEST_NAME)
-    return InputError(one_line(error.message), place, one_line(error.source or source, 4096))
+    place = message_line(error.place, 100 + LONGEST_NAME)
+    return InputError(message_line(error.message), place, message_line(error.source or source, 4096))
 
 
 def reason(error: Exception) -> str:
     """Return the text of a system error, for use after a colon."""
     words = getattr(error, "strerror", None) or str(error) or type(error).__name__
-    return one_line(words[0].lower() + words[1:])
+    return message_line(words[0].lower() + words[1:])
 
 
 def unwritable(error: OSError | ValueError, path: str | os.PathLike[str], source: str = "") -> InputError:
@@ -70,5 +70,5 @@ def unwritable(error: OSError | ValueError, path: str | os.PathLike[str], source
     elif isinstance(error, FileNotFoundError) and folder.is_dir():
         problem = f"no files can be created in {quoted(str(folder))}; name another folder"
     elif isinstance(error, FileNotFoundError):
-        problem = f"there is no folder {one_line(str(folder))!r}; create it first"
+        problem = f"there is no folder {message_line(str(folder))!r}; create it first"
     return InputError(f"cannot be written: {problem}", source=source)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from alloc.problems.errors import InputError
 from alloc.problems.formats.columns import UNIT_FIELDS, unknown_field
-from alloc.problems.formats.messages import one_line, quoted
+from alloc.problems.formats.messages import message_line, quoted
 
 LARGEST = 4 << 30
 """Maximum number of bytes of the uncompressed arrays of a file."""
@@ -132,7 +132,7 @@ def _check_promise(content: bytes, name: str) -> None:
 
 
 def _words(error: Exception) -> str:
-    return one_line(str(error), 120) or quoted(type(error).__name__)
+    return message_line(str(error), 120) or quoted(type(error).__name__)
 
 
 def packed(arrays: Mapping[str, NDArray[np.generic]]) -> bytes:

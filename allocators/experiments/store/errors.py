@@ -6,7 +6,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from alloc.problems import InputError
-from alloc.problems.formats.messages import one_line
+from alloc.problems.formats.messages import message_line
 
 BUSY_S = 30.0
 """Seconds to wait for a lock of another program."""
@@ -32,7 +32,7 @@ def _unopened(path: Path) -> str | None:
     if path.is_dir():
         return "is a folder where a file is expected"
     if not path.parent.exists():
-        return f"there is no folder {one_line(str(path.parent))!r}; create it first"
+        return f"there is no folder {message_line(str(path.parent))!r}; create it first"
     return None
 
 
@@ -44,7 +44,7 @@ def explained(path: str) -> Iterator[None]:
     except sqlite3.Error as error:
         name = str(getattr(error, "sqlite_errorname", ""))
         primary = "_".join(name.split("_")[:2])
-        words = MEANINGS.get(primary, f"cannot be used: {one_line(str(error))}")
+        words = MEANINGS.get(primary, f"cannot be used: {message_line(str(error))}")
         if primary == "SQLITE_CANTOPEN":
             words = _unopened(Path(path)) or words
         raise InputError(words, source=path) from error

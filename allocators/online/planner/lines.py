@@ -9,7 +9,7 @@ from alloc.problems.arguments import flag, real, shown, text
 from alloc.problems.errors import AllocError, InputError, nearest
 from alloc.problems.formats.json_columns import Row, require_known
 from alloc.problems.formats.json_text import parse, require_object
-from alloc.problems.formats.messages import one_line
+from alloc.problems.formats.messages import message_line
 from alloc.problems.missions.events import LATEST
 from alloc.problems.missions.files.document import mission_from_document
 from alloc.problems.missions.mission import Mission
@@ -50,7 +50,7 @@ class Lines:
         try:
             plan, error = self._do(require_object(parse(line))), None
         except AllocError as fault:
-            plan, error = None, one_line(str(fault))
+            plan, error = None, message_line(str(fault))
         hour = 0.0 if self._planner is None else self._planner.hour
         head: Row = {"format": ORDERS_FORMAT, "line": number, "hour": hour}
         if error is not None:

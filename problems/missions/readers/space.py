@@ -7,7 +7,7 @@ import numpy as np
 from alloc.problems.errors import InputError, MissingPackageError
 from alloc.problems.fields import FloatArray
 from alloc.problems.formats.files import named, read_text
-from alloc.problems.formats.messages import described, one_line
+from alloc.problems.formats.messages import described, message_line
 from alloc.problems.instance import Instance
 from alloc.problems.missions.mission import Mission
 from alloc.problems.missions.radio import Radio
@@ -82,7 +82,7 @@ def _parsed(path: str) -> object:
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)
         place = "" if mark is None else f"line {mark.line + 1}"
-        message = one_line(f"is not YAML: {getattr(error, 'problem', None) or 'it cannot be read'}")
+        message = message_line(f"is not YAML: {getattr(error, 'problem', None) or 'it cannot be read'}")
         raise InputError(message, place, named(path)) from error
     return value
 
