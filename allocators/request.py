@@ -14,7 +14,6 @@ from alloc.problems.allocation import CarriedOver, require_fit
 from alloc.problems.arguments import choice, of_type, real, whole
 from alloc.problems.vocabulary import OBJECTIVES
 
-LARGEST_SEED = 2**63 - 1
 MOST_THREADS = 1024
 
 Start = Allocation | Result | Mapping[str, str | None]
@@ -77,11 +76,6 @@ def checked_tolerance(slack: float, limit: float | None, objective: Objective) -
         goals = f"{Objective.MAKESPAN_ENERGY} or {Objective.MAKESPAN_MOVES}"
         raise InputError(f"needs the objective {goals}", name)
     return tolerance
-
-
-def checked_seed(seed: int, name: str = "seed") -> int:
-    """Return the seed as a whole number from 0 to 2^63 - 1."""
-    return whole(seed, name, 0, LARGEST_SEED)
 
 
 def checked_threads(threads: int | None) -> int | None:

@@ -29,7 +29,6 @@ from alloc.allocators.request import (
     Start,
     as_start,
     checked_pins,
-    checked_seed,
     checked_threads,
     checked_tolerance,
     default_threads,
@@ -38,7 +37,7 @@ from alloc.allocators.result import Result
 from alloc.allocators.runtime.interrupts import raise_if_cancelled, signals_set, stopped_at_exit
 from alloc.problems import InputError, Instance, Objective, find_shortage, serve_all
 from alloc.problems.allocation import CarriedOver
-from alloc.problems.arguments import choice, event, flag, function, of_type, real
+from alloc.problems.arguments import checked_seed, choice, event, flag, function, of_type, real
 
 REPAIR_S = 0.2
 """Seconds for serving further tasks after a run whose time is up."""

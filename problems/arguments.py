@@ -13,6 +13,8 @@ import numpy as np
 
 from alloc.problems.errors import InputError
 
+LARGEST_SEED = 2**63 - 1
+
 Kind = TypeVar("Kind")
 Choice = TypeVar("Choice", bound=StrEnum)
 
@@ -26,6 +28,11 @@ def whole(value: object, name: str, low: int | None = 0, high: int | None = None
     least, most = "" if low is None else f" >= {low}", "" if high is None else f" and at most {high}"
     ends = f" from {low} to {high}" if low is not None and high is not None else least + most
     raise InputError(f"must be a whole number{ends}, got {shown(value)}", name)
+
+
+def checked_seed(value: object, name: str = "seed") -> int:
+    """Return a seed of random numbers as an int if it is a whole number from 0 to 2^63 - 1."""
+    return whole(value, name, 0, LARGEST_SEED)
 
 
 def real(value: object, name: str, low: float = 0.0, high: float = math.inf, *, above: bool = False) -> float:

@@ -12,11 +12,11 @@ from alloc.allocators.contract.tolerance import relative_gap
 from alloc.allocators.experiments.store.outcome import Ending
 from alloc.allocators.experiments.sweep import by_label, load_failure, mean_and_worst, sweep
 from alloc.allocators.registry import load
-from alloc.allocators.request import checked_objective, checked_seed, checked_threads
+from alloc.allocators.request import checked_objective, checked_threads
 from alloc.allocators.result import Result
 from alloc.allocators.solve import solve
 from alloc.problems import InputError, Instance, Objective
-from alloc.problems.arguments import event, listed, of_type
+from alloc.problems.arguments import checked_seed, event, listed, of_type
 
 
 @dataclass(frozen=True, kw_only=True)

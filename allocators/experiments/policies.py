@@ -11,7 +11,7 @@ from alloc.allocators.online.registry import load_policy
 from alloc.allocators.online.run import simulate_until
 from alloc.allocators.runtime.interrupts import run_native
 from alloc.problems import InputError, MissingPackageError, Mission, MissionResult
-from alloc.problems.arguments import choice, event, listed, of_type, real, whole
+from alloc.problems.arguments import checked_seed, choice, event, listed, of_type, real
 from alloc.problems.vocabulary import Knowledge
 
 
@@ -124,7 +124,7 @@ def compare_policies(
     """
     given = by_label(policies, Policy, lambda policy: policy.info.name, "policies")  # type: ignore[type-abstract]
     loaded = {label: _loaded(policy) for label, policy in given.items()}
-    numbers = [whole(seed, "seeds", 0, 2**63 - 1) for seed in listed(seeds, "seeds", "whole numbers")]
+    numbers = [checked_seed(seed, "seeds") for seed in listed(seeds, "seeds", "whole numbers")]
     problems = missions if isinstance(missions, Iterator) else listed(missions, "missions", "missions")
     stop = event(stop, "stop") or threading.Event()
     known = None if knowledge is None else choice(Knowledge, knowledge, "knowledge")

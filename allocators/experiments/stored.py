@@ -9,9 +9,9 @@ from alloc.allocators.experiments.compare import Row, with_figures
 from alloc.allocators.experiments.store.key import Run, canonical, this_machine, versions
 from alloc.allocators.experiments.store.outcome import Ending, Outcome
 from alloc.allocators.experiments.store.store import CONDITIONS, Store
-from alloc.allocators.request import checked_objective, checked_seed, checked_threads
+from alloc.allocators.request import checked_objective, checked_threads
 from alloc.problems import Instance, Mission, Objective
-from alloc.problems.arguments import of_type
+from alloc.problems.arguments import checked_seed, of_type
 from alloc.problems.text import counted, percent
 
 ENOUGH = 0.9

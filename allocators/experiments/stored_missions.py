@@ -11,7 +11,7 @@ from alloc.allocators.experiments.store.store import Store
 from alloc.allocators.experiments.stored import Comparison, Endings, Variants, plan, unsolved
 from alloc.allocators.online.registry import ENTRY_POINT_GROUP, POLICIES
 from alloc.problems import Mission, MissionResult
-from alloc.problems.arguments import choice, of_type, real, whole
+from alloc.problems.arguments import checked_seed, choice, of_type, real
 from alloc.problems.vocabulary import Knowledge
 
 
@@ -49,7 +49,7 @@ def planned_missions(
     common = Run(objective=MISSION, deadline_ms=deadline, machine=machine or this_machine())
     problems = [(mission, replace(common, knowledge=str(known or mission.knowledge))) for mission in missions]
     packages = {name: versions(name, ENTRY_POINT_GROUP, POLICIES) for name, _ in policies.values()}
-    numbers = [whole(seed, "seeds", 0, 2**63 - 1) for seed in seeds]
+    numbers = [checked_seed(seed, "seeds") for seed in seeds]
     return plan(store, problems, policies, numbers, packages)
 
 

@@ -8,7 +8,7 @@ from alloc.allocators.online.contract import AgentDecider, Briefing, FleetDecide
 from alloc.allocators.online.registry import describe_policy, load_policy
 from alloc.allocators.parallel.engine import never_stop
 from alloc.problems import InputError, RefusedError
-from alloc.problems.arguments import choice, of_type, real, whole
+from alloc.problems.arguments import checked_seed, choice, of_type, real
 from alloc.problems.missions.files.log_file import MissionLog
 from alloc.problems.missions.mission import Mission
 from alloc.problems.missions.replay import log_of
@@ -101,7 +101,7 @@ def simulate_until(
     of_type(mission, Mission, "mission")
     of_type(policy, (str, Policy), "policy")
     known = mission.knowledge if knowledge is None else choice(Knowledge, knowledge, "knowledge")
-    number = whole(seed, "seed", 0, 2**63 - 1)
+    number = checked_seed(seed)
     deadline_s = None if deadline_ms is None else real(deadline_ms, "deadline_ms", above=True) / 1000
     if isinstance(policy, Policy) and (settings or parameters is not None):
         raise InputError("is an object with its own parameters; set them when you create it", "policy")

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from alloc.problems import fields
-from alloc.problems.arguments import choice, listed, of_type, real, whole
+from alloc.problems.arguments import checked_seed, choice, listed, of_type, real
 from alloc.problems.errors import InputError
 from alloc.problems.fields import FloatArray
 from alloc.problems.instance import Instance
@@ -102,7 +102,7 @@ class Mission(fields.ReadOnly):
             "sensing": math.inf if sensing == math.inf else float(real(sensing, "sensing")),
             "radio": Radio() if radio is None else of_type(radio, Radio, "radio"),
             "pace": None if pace is None else of_type(pace, Pace, "pace"),
-            "seed": whole(seed, "seed", 0, 2**63 - 1),
+            "seed": checked_seed(seed),
         }
         assert len(instance.ability) == n
         for key, value in values.items():

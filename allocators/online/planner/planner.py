@@ -18,7 +18,7 @@ from alloc.allocators.online.planner.plan import OrderChange, Plan, changes_of
 from alloc.allocators.online.planner.policy_runner import Decision, PolicyRunner
 from alloc.allocators.online.registry import load_policy
 from alloc.problems import InputError, Instance, Mission
-from alloc.problems.arguments import of_type, real, text, whole
+from alloc.problems.arguments import checked_seed, of_type, real, text
 from alloc.problems.formats.files import PathLike
 from alloc.problems.formats.json_text import require_object
 from alloc.problems.missions.events import LATEST, Event
@@ -68,7 +68,7 @@ class MissionPlanner(AbstractContextManager["MissionPlanner"]):
         if isinstance(policy, Policy) and settings:
             raise InputError("is an object with its own parameters; set them when you create it", "policy")
         self._deadline_s = None if deadline_ms is None else real(deadline_ms, "deadline_ms", above=True) / 1000
-        self._seed = whole(seed, "seed", 0, 2**63 - 1)
+        self._seed = checked_seed(seed)
         self._made_of = (policy if isinstance(policy, str) else None, settings)
         chosen = load_policy(policy, **settings) if isinstance(policy, str) else policy
         self._estimate = StateEstimate(mission if isinstance(mission, Mission) else Mission.from_instance(mission))

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from alloc.problems.arguments import whole
+from alloc.problems.arguments import checked_seed, whole
 from alloc.problems.fields import FloatArray
 from alloc.problems.instance import Instance
 from alloc.problems.missions.mission import Mission
@@ -39,7 +39,7 @@ def random_cfstp(agents: int = 20, tasks: int = 300, seed: int = 0, *, name: str
     Ramchurn (2020), arXiv:2003.13806.
     """
     n, m = whole(agents, "agents", 1), whole(tasks, "tasks", 1)
-    number = whole(seed, "seed", 0, 2**63 - 1)
+    number = checked_seed(seed)
     rng = np.random.default_rng(number)
     workload = rng.integers(*WORKLOAD, m, endpoint=True)
     starts, places = rng.integers(0, SIDE, (n, 2)), rng.integers(0, SIDE, (m, 2))

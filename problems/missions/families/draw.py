@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from alloc.problems.arguments import of_type, whole
+from alloc.problems.arguments import checked_seed, of_type
 from alloc.problems.changes.remove import replaced
 from alloc.problems.errors import InputError
 from alloc.problems.fields import BoolArray
@@ -64,7 +64,7 @@ def random_mission(parameters: MissionParameters, seed: int, *, name: str | None
         If the seed is invalid, or sizes are given for a scenario of the paper, which fixes them.
     """
     of_type(parameters, MissionParameters, "parameters")
-    number = whole(seed, "seed", 0, 2**63 - 1)
+    number = checked_seed(seed)
     rng = np.random.default_rng(number)
     family = MissionFamily(parameters.family)
     called = name if name is not None else f"mission-{family}-seed-{number}"

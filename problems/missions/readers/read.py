@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from pathlib import Path
 
-from alloc.problems.arguments import choice, of_type, whole
+from alloc.problems.arguments import checked_seed, choice, of_type
 from alloc.problems.errors import InputError, MissingPackageError
 from alloc.problems.formats.files import PathLike, named
 from alloc.problems.formats.messages import told
@@ -63,7 +63,7 @@ def import_mission(
     MissingPackageError
         If PyYAML is needed and not installed.
     """
-    kind, number = choice(ForeignFormat, file_format, "file_format"), whole(seed, "seed", 0, 2**63 - 1)
+    kind, number = choice(ForeignFormat, file_format, "file_format"), checked_seed(seed)
     called, source = name or Path(path).stem or str(kind), str(path)
     if kind in DRAWN:
         if options is not None:

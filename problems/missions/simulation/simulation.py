@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterator
 
-from alloc.problems.arguments import choice, of_type, whole
+from alloc.problems.arguments import checked_seed, choice, of_type
 from alloc.problems.missions.events import Event, EventKind
 from alloc.problems.missions.mission import Mission
 from alloc.problems.missions.simulation import conservation
@@ -77,7 +77,7 @@ class Simulation:
         self.mission, self.state = mission, MissionState(mission)
         self.log = Log(self.state)
         self.messages, self.bytes = [0] * mission.instance.n, [0] * mission.instance.n
-        self._channel = Channel(self.state, whole(seed, "seed", 0, 2**63 - 1))
+        self._channel = Channel(self.state, checked_seed(seed))
         self._is_local = self.knowledge is Knowledge.LOCAL
         self._awareness: Awareness | None = None
         if aware:
