@@ -33,12 +33,13 @@ PRECISION, EARLY = 1e-5, 0.05
 """Relative difference between bound and programme at which prices count as optimal; share of the gap to the plan at
 which cuts are added before that."""
 
-FIRST_NODES, MORE_NODES, MOST_NODES = 20_000, 4, 320_000
-"""Limit on the nodes of the search for one group at first, its growth factor, and its maximum."""
+FIRST_NODES, MORE_NODES, MOST_NODES = 20_000, 4, 4_000_000
+"""Limit on the nodes of the search for one group at first, its growth factor, and the limit on all searches of a round,
+less than a second."""
 
 MOST_LOST = 0.1
-"""Share of the gap to the plan that truncated searches for groups may cost; beyond it, their limit grows, and at its
-maximum cuts over classes, which slow down these searches, are removed."""
+"""Share of the gap to the plan that truncated searches for groups may cost. Beyond it, longer searches are allowed; if
+even the longest ones lose as much, cuts over classes, which slow them down, are removed."""
 
 MORE = 8
 """Factor on the number of enumerated groups, as earlier prices exclude many of them."""
@@ -161,7 +162,7 @@ class CuttingPlanes:
         penalty = smoothing * known + (1 - smoothing) * master.penalty
         value, group, least = self._relax(price, penalty)
         if self._lost(group, least, price, penalty) > MOST_LOST * max(0.0, cost - max(self.bound, value)):
-            if self._nodes < MOST_NODES:
+            if MORE_NODES * self._nodes * len(self._need) <= MOST_NODES:
                 self._nodes *= MORE_NODES
                 return
             known[master.leave_out_sets()] = 0.0

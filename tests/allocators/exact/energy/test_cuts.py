@@ -6,7 +6,7 @@ import pytest
 from scipy.optimize import linprog
 from scipy.sparse import csr_array
 
-from alloc.allocators.exact.energy.cuts import group_master
+from alloc.allocators.exact.energy.cuts import cutting_planes, group_master
 from alloc.allocators.exact.energy.cuts.all_groups import write_groups
 from alloc.allocators.exact.energy.cuts.cluster_cuts import ClusterSeparation, sharing_clusters
 from alloc.allocators.exact.energy.cuts.cutting_planes import CuttingPlanes
@@ -46,7 +46,7 @@ def test_cheapest_group_with_cuts_matches_enumeration(seed, kind):
     group = np.zeros(7, dtype=np.int64)
     least = price_groups(
         np.array([0, 7]), task.weight, task.price, task.copies, np.array([task.need]), np.array([task.max_weight]),
-        task.is_whole, task.first_cut, task.cut, task.penalty, np.array([100.0]), group,
+        task.is_whole, task.first_cut, task.cut, task.penalty, np.array([100.0]), group, 20_000,
     )  # fmt: skip
     assert least == pytest.approx(task.cost.min(), abs=1e-6)
     assert task.costs(group) == pytest.approx(task.cost.min())
@@ -235,6 +235,17 @@ def test_bound_with_cuts_reaches_the_least_cost_with_an_integer_mixture():
     assert mixed @ model.cost >= cuts.bound - 1e-3
     assert (np.bincount(model.class_of_pair, mixed, 4) <= model.count + 1e-6).all()
     assert (np.bincount(model.task_of_pair, mixed * model.weight, 2) >= model.need - 1e-6).all()
+
+
+@pytest.mark.parametrize(("most", "bound"), [(1000, 5.0), (1, 4.5)])
+def test_longer_searches_for_groups_are_tried_before_cuts_over_classes_are_removed(most, bound, monkeypatch):
+    """Searches of one node lose so much that cuts are of no use; those cuts are removed if searches may not be longer."""
+    monkeypatch.setattr(cutting_planes, "FIRST_NODES", 1)
+    monkeypatch.setattr(cutting_planes, "MOST_NODES", most)
+    model, groups = three_for_two()
+    cuts = CuttingPlanes(model, np.zeros((0, 2), dtype=bool), np.zeros(4), groups)
+    cuts.ascend(50, 5.5)
+    assert cuts.bound == pytest.approx(bound, abs=1e-3)
 
 
 def real_tasks(seed):

@@ -1,10 +1,10 @@
-from itertools import product
+from itertools import pairwise, product
 
 import numpy as np
 import pytest
 
 from alloc.allocators.exact.energy.pairwise import repartition_pair, total_distance
-from alloc.allocators.exact.energy.pairwise_search import PairwiseSearch
+from alloc.allocators.exact.energy.pairwise_search import CYCLES, PairwiseSearch, Perturbation
 
 
 @pytest.mark.parametrize("partner", ["task", "idleness"])
@@ -68,6 +68,17 @@ def test_search_assigns_agents_only_to_allowed_tasks():
     moved = (search.best != task) & (search.best < 6)
     assert moved.any()
     assert allowed[moved, search.best[moved]].all()
+
+
+def test_each_cooling_cycle_starts_from_the_best_plan():
+    """At the start of a cycle, a hot search leaves the best plan; the next cycle returns to it."""
+    search, _, _ = search_of(2)
+    search._perturbation = Perturbation(temperature=1000.0)
+    for begin, end in pairwise((0.0, *CYCLES[:-1])):
+        search.anneal(30, begin)
+        assert search._task.tolist() != search.best.tolist()
+        search.anneal(0, end)
+        assert search._task.tolist() == search.best.tolist()
 
 
 def test_search_adopts_better_feasible_plans():
