@@ -129,18 +129,18 @@ class Entry:
 class Report:
     """The state of an agent at an hour; `task` is where it was flying or working.
 
+    It is as long as a cache line, with the fields that every decision reads at the front.
+
     Attributes
     ----------
     arrives : float
         Hour of its arrival at this task, ``-inf`` if it works there.
-    ability : float
     """
 
     hour: float
     status: int
     task: int
     arrives: float
-    ability: float
     x: float
     y: float
     z: float

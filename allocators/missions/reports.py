@@ -39,7 +39,7 @@ def write_report(state: MissionArrays, agent: Agent, report: Report) -> None:
     """Write a report of an agent."""
     head = state.head[0]
     here = place_of(agent, head.hour)
-    report.hour, report.status, report.ability = head.hour, agent.status, agent.ability
+    report.hour, report.status = head.hour, agent.status
     report.x, report.y, report.z = here
     report.battery = battery_of(agent, head.hour)
     report.task, report.arrives = NOBODY, -np.inf
@@ -164,7 +164,7 @@ def keep_marked(state: MissionArrays) -> int:
 def copy(one: Report, other: Report) -> None:
     """Copy a report."""
     other.hour, other.status, other.task = one.hour, one.status, one.task
-    other.arrives, other.ability, other.battery = one.arrives, one.ability, one.battery
+    other.arrives, other.battery = one.arrives, one.battery
     other.x, other.y, other.z = one.x, one.y, one.z
 
 

@@ -58,7 +58,8 @@ class Situation(NamedTuple):
     can : ndarray of bool, shape (m,)
         Whether the agent knows the task to be open, and can take it.
     other : ndarray, shape (OTHER, n)
-        Figures of each other agent that counts, by the indices below.
+        Figures of each other agent that counts, by the indices below; those from `OTHER_Z` on only of agents without a
+        task.
     target : ndarray of int, shape (n,)
         Task to which another agent goes or at which it works, -1 for none.
     counts : ndarray of bool, shape (n,)
@@ -171,19 +172,23 @@ def does_count(report: Report, who: int, number: int, hour: float, memory: float
 def fill_others(state: MissionArrays, number: int, situation: Situation, memory: float) -> None:
     """Write an agent's knowledge of the other agents that count, with reports at most `memory` hours old."""
     head, row, found = state.head[0], state.agents[number].known, 0
+    oldest = head.oldest
     known, task_hours = state.known_report[row], state.task_hour[row]
     other, target, counts = situation.other, situation.target, situation.counts
     for who in range(len(known)):
+        if known[who] < oldest:
+            continue
         report = state.reports[known[who]]
         if not does_count(report, who, number, head.hour, memory):
             continue
         agent = state.agents[who]
-        other[STRENGTH, found], other[PACE, found] = report.ability, agent.speed
-        other[CHARGE, found], other[PRICE, found] = report.battery, agent.energy_per_distance
-        other[HEARD, found], other[IS_FREE, found] = report.hour, report.status == IDLE
-        other[OTHER_X, found], other[OTHER_Y, found], other[OTHER_Z, found] = report.x, report.y, report.z
+        other[ARRIVES, found], other[STRENGTH, found] = report.arrives, agent.ability
+        other[OTHER_X, found], other[OTHER_Y, found] = report.x, report.y
         target[found] = report.task if report.task != NOBODY and task_hours[report.task] >= 0 else NOBODY
-        other[ARRIVES, found] = report.arrives
+        if target[found] == NOBODY:
+            other[OTHER_Z, found], other[PACE, found] = report.z, agent.speed
+            other[CHARGE, found], other[PRICE, found] = report.battery, agent.energy_per_distance
+            other[HEARD, found], other[IS_FREE, found] = report.hour, report.status == IDLE
         counts[found] = True
         found += 1
     clear_others(situation, found)
