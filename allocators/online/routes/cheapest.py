@@ -14,7 +14,7 @@ from alloc.allocators.online.routes.insertion import (
 )
 from alloc.allocators.online.routes.record import Schedule
 from alloc.allocators.online.routes.situation import Floats, Ints, Situation
-from alloc.allocators.runtime.compiled import compiled, inlined
+from alloc.allocators.runtime.compiled import compiled, compiled_in_place, inlined
 
 NOISE = 0.3
 """Largest relative random noise on costs, which diversifies rebuilt plans."""
@@ -56,7 +56,7 @@ def insert_cheapest(
                             cheapest[k] = i
 
 
-@compiled
+@compiled_in_place
 def _least(s: Situation, waiting: Ints, cost: Floats, cheapest: Ints, blur: Floats) -> int:
     """Return the index in `waiting` of the task with the least noisy cost per weight, -1 if none can be inserted."""
     best, best_k = np.inf, -1
@@ -68,7 +68,7 @@ def _least(s: Situation, waiting: Ints, cost: Floats, cheapest: Ints, blur: Floa
     return best_k
 
 
-@compiled
+@compiled_in_place
 def _best_of(
     s: Situation, r: Schedule, routes: Ints, lengths: Ints, slack: Floats, i: int, j: int, balance: float
 ) -> tuple[float, int, float]:

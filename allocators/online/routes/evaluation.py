@@ -5,11 +5,11 @@ import numpy as np
 from alloc.allocators.online.routes.record import Schedule
 from alloc.allocators.online.routes.schedule import DONE, GONE, OVER, is_at_first, play_touched
 from alloc.allocators.online.routes.situation import Ints, Situation
-from alloc.allocators.runtime.compiled import compiled, inlined
+from alloc.allocators.runtime.compiled import compiled_in_place, inlined
 from alloc.problems.distances.reach import TOLERANCE
 
 
-@compiled
+@compiled_in_place
 def play(s: Situation, r: Schedule, routes: Ints, lengths: Ints) -> None:
     """Compute the whole schedule of a plan.
 
@@ -29,7 +29,7 @@ def play(s: Situation, r: Schedule, routes: Ints, lengths: Ints) -> None:
     _schedule(s, r, routes, lengths)
 
 
-@compiled
+@compiled_in_place
 def replay(s: Situation, r: Schedule, routes: Ints, lengths: Ints, before: Ints, before_lengths: Ints) -> None:
     """Update the schedule of a previous plan to that of a changed one.
 
@@ -80,7 +80,7 @@ def _shares(r: Schedule, routes: Ints, lengths: Ints, i: int) -> bool:
     return shares
 
 
-@compiled
+@compiled_in_place
 def _schedule(s: Situation, r: Schedule, routes: Ints, lengths: Ints) -> None:
     """Schedule all touched agents: jointly, or one by one if no two of them share a task."""
     meets = len(s.events) > 0
@@ -104,7 +104,7 @@ def _schedule(s: Situation, r: Schedule, routes: Ints, lengths: Ints) -> None:
     _sum_up(s, r)
 
 
-@compiled
+@compiled_in_place
 def _play_alone(s: Situation, r: Schedule, routes: Ints, lengths: Ints, i: int) -> None:
     """Compute the schedule of an agent that shares no task with others."""
     hour, node, first, p = max(s.hour, s.agents[i].free), -1, -1, 0
@@ -147,7 +147,7 @@ def _play_alone(s: Situation, r: Schedule, routes: Ints, lengths: Ints, i: int) 
     r.agents[i].first = first
 
 
-@compiled
+@compiled_in_place
 def _sum_up(s: Situation, r: Schedule) -> None:
     """Compute the totals of the schedule."""
     r.totals[:] = 0.0
@@ -163,7 +163,7 @@ def _sum_up(s: Situation, r: Schedule) -> None:
         r.totals[5] += r.agents[i].works
 
 
-@compiled
+@compiled_in_place
 def copy_touched(
     marks: Schedule,
     r: Schedule,

@@ -5,7 +5,7 @@ import numpy as np
 from alloc.allocators.online.routes.queue import push
 from alloc.allocators.online.routes.record import Schedule
 from alloc.allocators.online.routes.situation import FIXED, MANHATTAN, Ints, Situation
-from alloc.allocators.runtime.compiled import compiled, inlined
+from alloc.allocators.runtime.compiled import compiled_in_place, inlined
 from alloc.problems.distances.reach import TOLERANCE
 
 IDLE, FLYING, PRESENT, AWAY = 0, 1, 2, 3
@@ -29,7 +29,7 @@ def distance_to(s: Situation, r: Schedule, i: int, j: int) -> float:
     return float(abs(x) + abs(y) + abs(z) if s.metric == MANHATTAN else np.sqrt(x * x + y * y + z * z))
 
 
-@compiled
+@compiled_in_place
 def depart(s: Situation, r: Schedule, routes: Ints, lengths: Ints, i: int, hour: float, size: int) -> int:
     """Start an agent's flight to the next task of its route that it can do; return the size of the queue."""
     while r.agents[i].pointer < lengths[i]:

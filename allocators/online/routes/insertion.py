@@ -6,10 +6,10 @@ import numpy as np
 
 from alloc.allocators.online.routes.record import Schedule
 from alloc.allocators.online.routes.situation import Floats, Ints, Situation
-from alloc.allocators.runtime.compiled import compiled, inlined
+from alloc.allocators.runtime.compiled import compiled, compiled_in_place, inlined
 
 
-@compiled
+@compiled_in_place
 def tidy(r: Schedule, routes: Ints, lengths: Ints) -> bool:
     """Remove visits that the schedule skips; return whether there were any."""
     is_changed = False
@@ -25,7 +25,7 @@ def tidy(r: Schedule, routes: Ints, lengths: Ints) -> bool:
     return is_changed
 
 
-@compiled
+@compiled_in_place
 def find_slack(s: Situation, r: Schedule, routes: Ints, lengths: Ints, slack: Floats, i: int) -> None:
     """Compute by how many hours each visit of an agent may be delayed without missing a deadline."""
     least = np.inf
@@ -81,7 +81,7 @@ def place_between(
     return arrives, latest, detour
 
 
-@compiled
+@compiled_in_place
 def insert(
     s: Situation, r: Schedule, routes: Ints, lengths: Ints, slack: Floats, i: int, p: int, j: int, leaves: float
 ) -> None:
@@ -99,7 +99,7 @@ def insert(
     find_slack(s, r, routes, lengths, slack, i)
 
 
-@compiled
+@compiled_in_place
 def insert_best(
     s: Situation, r: Schedule, routes: Ints, lengths: Ints, slack: Floats, j: int, balance: float, blink: float
 ) -> bool:

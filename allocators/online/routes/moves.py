@@ -6,7 +6,7 @@ import numpy as np
 
 from alloc.allocators.online.routes.record import Schedule
 from alloc.allocators.online.routes.situation import Ints, Situation
-from alloc.allocators.runtime.compiled import compiled
+from alloc.allocators.runtime.compiled import compiled_in_place
 
 MOVES = 8
 
@@ -14,7 +14,7 @@ AGAIN = 0.3
 """Probability of one more move: some plans can be reached only through worse ones."""
 
 
-@compiled
+@compiled_in_place
 def change(s: Situation, r: Schedule, nearest: Ints, routes: Ints, lengths: Ints) -> bool:
     """Make one or a few random moves; return whether the plan has changed.
 
@@ -35,7 +35,7 @@ def change(s: Situation, r: Schedule, nearest: Ints, routes: Ints, lengths: Ints
             return is_changed
 
 
-@compiled
+@compiled_in_place
 def _change_once(s: Situation, r: Schedule, nearest: Ints, routes: Ints, lengths: Ints) -> bool:
     n = len(lengths)
     i, p = _random_visit(lengths)
@@ -78,7 +78,7 @@ def _change_once(s: Situation, r: Schedule, nearest: Ints, routes: Ints, lengths
     return True
 
 
-@compiled
+@compiled_in_place
 def _random_visit(lengths: Ints) -> tuple[int, int]:
     total = lengths.sum()
     if total == 0:
@@ -91,7 +91,7 @@ def _random_visit(lengths: Ints) -> tuple[int, int]:
     return -1, -1
 
 
-@compiled
+@compiled_in_place
 def _visit_of(routes: Ints, lengths: Ints, j: int) -> tuple[int, int]:
     for i in range(len(lengths)):
         for p in range(lengths[i]):
@@ -100,7 +100,7 @@ def _visit_of(routes: Ints, lengths: Ints, j: int) -> tuple[int, int]:
     return -1, -1
 
 
-@compiled
+@compiled_in_place
 def _has(routes: Ints, lengths: Ints, i: int, j: int) -> bool:
     for p in range(lengths[i]):  # noqa: SIM110 - compiled
         if routes[i, p] == j:
@@ -108,7 +108,7 @@ def _has(routes: Ints, lengths: Ints, i: int, j: int) -> bool:
     return False
 
 
-@compiled
+@compiled_in_place
 def _latest(r: Schedule, routes: Ints, lengths: Ints) -> int:
     """Return the task that is done last."""
     last, hour = routes[0, 0], -np.inf
@@ -120,14 +120,14 @@ def _latest(r: Schedule, routes: Ints, lengths: Ints) -> int:
     return int(last)
 
 
-@compiled
+@compiled_in_place
 def _remove(routes: Ints, lengths: Ints, i: int, p: int) -> None:
     for q in range(p, lengths[i] - 1):
         routes[i, q] = routes[i, q + 1]
     lengths[i] -= 1
 
 
-@compiled
+@compiled_in_place
 def _add(s: Situation, routes: Ints, lengths: Ints, i: int, p: int, j: int) -> bool:
     if not s.allowed[i, j] or lengths[i] >= routes.shape[1] or _has(routes, lengths, i, j):
         return False
@@ -139,7 +139,7 @@ def _add(s: Situation, routes: Ints, lengths: Ints, i: int, p: int, j: int) -> b
     return True
 
 
-@compiled
+@compiled_in_place
 def _move(s: Situation, routes: Ints, lengths: Ints, i: int, p: int, k: int, q: int) -> bool:
     j = routes[i, p]
     if i == k:
@@ -153,7 +153,7 @@ def _move(s: Situation, routes: Ints, lengths: Ints, i: int, p: int, k: int, q: 
     return True
 
 
-@compiled
+@compiled_in_place
 def _swap_tails(routes: Ints, lengths: Ints, i: int, p: int, k: int) -> bool:
     if i == k:
         return False

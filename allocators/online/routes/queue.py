@@ -3,7 +3,7 @@
 import numpy as np
 
 from alloc.allocators.online.routes.situation import Records
-from alloc.allocators.runtime.compiled import compiled, inlined
+from alloc.allocators.runtime.compiled import compiled_in_place, inlined
 
 ENTRY = np.dtype([("hour", np.float64), ("item", np.int64), ("version", np.int64)])
 
@@ -19,7 +19,7 @@ def _copy(queue: Records, to: int, source: int) -> None:
     queue[to].version = queue[source].version
 
 
-@compiled
+@compiled_in_place
 def push(queue: Records, size: int, hour: float, item: int, version: int) -> int:
     """Push an item; return the new size. At equal hours, smaller items come first."""
     child = size
@@ -33,7 +33,7 @@ def push(queue: Records, size: int, hour: float, item: int, version: int) -> int
     return size + 1
 
 
-@compiled
+@compiled_in_place
 def drop_first(queue: Records, size: int) -> int:
     """Remove the first item; return the new size."""
     size -= 1

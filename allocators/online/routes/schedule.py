@@ -11,13 +11,13 @@ from alloc.allocators.online.routes.flights import AWAY, FLYING, IDLE, KIND, PRE
 from alloc.allocators.online.routes.queue import drop_first, push
 from alloc.allocators.online.routes.record import Schedule
 from alloc.allocators.online.routes.situation import CANCELLED, CHARGED, IN, OPENS, OUT, Ints, Situation
-from alloc.allocators.runtime.compiled import compiled, inlined
+from alloc.allocators.runtime.compiled import compiled_in_place, inlined
 
 DONE, OVER, GONE = 1, 2, 3
 """How a task is closed: done, missed, cancelled."""
 
 
-@compiled
+@compiled_in_place
 def play_touched(s: Situation, r: Schedule, routes: Ints, lengths: Ints) -> None:
     """Compute the schedule of the agents and tasks marked as touched, which must share no task with other agents.
 
@@ -44,7 +44,7 @@ def play_touched(s: Situation, r: Schedule, routes: Ints, lengths: Ints) -> None
             size = _close(s, r, routes, lengths, index, DONE if kind == 0 else OVER, hour, size)
 
 
-@compiled
+@compiled_in_place
 def _begin(s: Situation, r: Schedule, routes: Ints, lengths: Ints) -> int:
     """Initialise the simulation at the hour of the situation; return the size of the queue."""
     n, size = len(s.agents), 0
@@ -85,7 +85,7 @@ def is_at_first(s: Situation, routes: Ints, lengths: Ints, i: int) -> bool:
     return bool(s.agents[i].active and lengths[i] > 0 and s.agents[i].at >= 0 and routes[i, 0] == s.agents[i].at)
 
 
-@compiled
+@compiled_in_place
 def _arrive(s: Situation, r: Schedule, routes: Ints, lengths: Ints, i: int, hour: float, size: int) -> int:
     j = r.agents[i].target
     land(s, r, i, hour)
@@ -126,7 +126,7 @@ def _announce(s: Situation, r: Schedule, j: int, hour: float, size: int) -> int:
     return push(r.queue, size, end, (KIND if is_missed else 0) + j, r.tasks[j].edition)
 
 
-@compiled
+@compiled_in_place
 def _close(s: Situation, r: Schedule, routes: Ints, lengths: Ints, j: int, how: int, hour: float, size: int) -> int:
     """Close a task; agents that are there or on their way go on to their next one."""
     r.tasks[j].closed = how
@@ -149,7 +149,7 @@ def _close(s: Situation, r: Schedule, routes: Ints, lengths: Ints, j: int, how: 
     return size
 
 
-@compiled
+@compiled_in_place
 def _happen(s: Situation, r: Schedule, routes: Ints, lengths: Ints, k: int, hour: float, size: int) -> int:
     """Apply a known future event."""
     kind, index = s.events[k].kind, s.events[k].index
@@ -169,7 +169,7 @@ def _happen(s: Situation, r: Schedule, routes: Ints, lengths: Ints, k: int, hour
     return size
 
 
-@compiled
+@compiled_in_place
 def _change(s: Situation, r: Schedule, routes: Ints, lengths: Ints, k: int, hour: float, size: int) -> int:
     """Open a task, or change its work left."""
     j = s.events[k].index
@@ -189,7 +189,7 @@ def _change(s: Situation, r: Schedule, routes: Ints, lengths: Ints, k: int, hour
     return _announce(s, r, j, hour, size)
 
 
-@compiled
+@compiled_in_place
 def _leave(s: Situation, r: Schedule, i: int, hour: float, size: int) -> int:
     """Remove an agent from the mission, for good or for a while."""
     j = r.agents[i].target

@@ -10,7 +10,7 @@ from alloc.allocators.online.routes.insertion import find_slack, insert_best, in
 from alloc.allocators.online.routes.moves import change
 from alloc.allocators.online.routes.record import Schedule
 from alloc.allocators.online.routes.situation import Bools, Floats, Ints, Situation
-from alloc.allocators.runtime.compiled import compiled
+from alloc.allocators.runtime.compiled import compiled, compiled_in_place
 
 UNDONE = 1e4
 """Cost of leaving all tasks undone, relative to mission time in units of the situation's scale."""
@@ -39,7 +39,7 @@ MOST_OUT, MOST_NEAR, MOST_WAITING, MOST_MEETINGS, BY_TIME = 7, 10, 4, 2, 0.6
 on tasks for which a coalition is sought; probability of removing by time rather than by distance."""
 
 
-@compiled
+@compiled_in_place
 def value(s: Situation, r: Schedule) -> float:
     """Return the cost of a schedule: undone weight, then time, then flights and switches."""
     n, undone = len(s.agents), max(0.0, r.totals[0])
@@ -55,7 +55,7 @@ def value(s: Situation, r: Schedule) -> float:
     return float(cost + time / s.scale)
 
 
-@compiled
+@compiled_in_place
 def _take_out(r: Schedule, nearest: Ints, routes: Ints, lengths: Ints, near: Ints) -> None:
     """Ruin: remove a segment of a route and other agents' visits at that time, or visits close to each other in space.
 
