@@ -2,6 +2,8 @@
 
 # ruff: noqa: NPY002 - compiled code seeds numba's own generator
 
+from typing import NamedTuple
+
 import numpy as np
 
 from alloc.allocators.online.routes.insertion import (
@@ -13,7 +15,7 @@ from alloc.allocators.online.routes.insertion import (
     place_between,
 )
 from alloc.allocators.online.routes.record import Schedule
-from alloc.allocators.online.routes.situation import Floats, Ints, Situation
+from alloc.allocators.online.routes.situation import Bools, Floats, Ints, Situation
 from alloc.allocators.runtime.compiled import compiled, compiled_in_place, inlined
 
 NOISE = 0.3
@@ -28,7 +30,47 @@ def insert_cheapest(
     n, count = len(lengths), len(waiting)
     cost, place, leaves = np.empty((count, n)), np.empty((count, n), np.int64), np.empty((count, n))
     cheapest, blur = np.empty(count, np.int64), 1 + NOISE * np.random.random(count)
-    is_bound = np.zeros((count, n), np.bool_)  # costs only rise as routes fill: old ones are lower bounds
+    is_bound = np.zeros((count, n), np.bool_)
+    options = Options(cost, place, leaves, cheapest, blur, is_bound)
+    _insert_cheapest(s, r, routes, lengths, slack, waiting, balance, options)
+
+
+class Options(NamedTuple):
+    """The best insertion of each of `k` tasks into the route of each of `n` agents.
+
+    Attributes
+    ----------
+    cost, place, leaves : ndarray, shape (k, n)
+        Cost, position, and hour of leaving the task.
+    cheapest : ndarray of int, shape (k,)
+        Agent with the least cost.
+    blur : ndarray, shape (k,)
+        Random factor on the costs of each task.
+    is_bound : ndarray of bool, shape (k, n)
+        Whether the cost is that of an earlier plan; as costs only rise while routes fill, it is a lower bound.
+    """
+
+    cost: Floats
+    place: Ints
+    leaves: Floats
+    cheapest: Ints
+    blur: Floats
+    is_bound: Bools
+
+
+@compiled_in_place
+def _insert_cheapest(
+    s: Situation,
+    r: Schedule,
+    routes: Ints,
+    lengths: Ints,
+    slack: Floats,
+    waiting: Ints,
+    balance: float,
+    options: Options,
+) -> None:
+    n, count = len(lengths), len(waiting)
+    cost, place, leaves, cheapest, blur, is_bound = options
     for k in range(count):
         for i in range(n):
             cost[k, i], place[k, i], leaves[k, i] = _best_of(s, r, routes, lengths, slack, i, waiting[k], balance)

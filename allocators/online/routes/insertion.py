@@ -2,6 +2,8 @@
 
 # ruff: noqa: NPY002 - compiled code seeds numba's own generator
 
+from typing import NamedTuple
+
 import numpy as np
 
 from alloc.allocators.online.routes.record import Schedule
@@ -153,12 +155,47 @@ def insert_coalition(s: Situation, r: Schedule, routes: Ints, lengths: Ints, sla
     Return whether there are enough agents.
     """
     n = len(lengths)
-    window, place, arrival, limit = np.zeros(n), np.zeros(n, np.int64), np.zeros(n), np.zeros(n)
-    for i in range(n):
+    windows = Windows(np.zeros(n), np.zeros(n, np.int64), np.zeros(n), np.zeros(n))
+    _find_windows(s, r, routes, lengths, slack, j, windows)
+    return _insert_fewest(s, r, routes, lengths, slack, j, windows, np.argsort(-windows.work))
+
+
+class Windows(NamedTuple):
+    """The position in each route that leaves most time for a task, shape (n,).
+
+    Attributes
+    ----------
+    work : ndarray
+        Work that the agent can do there, 0 for none.
+    place : ndarray of int
+        Position in the route.
+    arrival, limit : ndarray
+        Hours of arrival and of the latest departure.
+    """
+
+    work: Floats
+    place: Ints
+    arrival: Floats
+    limit: Floats
+
+
+@compiled_in_place
+def _find_windows(
+    s: Situation,
+    r: Schedule,
+    routes: Ints,
+    lengths: Ints,
+    slack: Floats,
+    j: int,
+    windows: Windows,
+) -> None:
+    """Find the windows of a task."""
+    work, place, arrival, limit = windows
+    for i in range(len(lengths)):
         if not s.allowed[i, j] or lengths[i] >= routes.shape[1]:
             continue
         for p in range(lengths[i] + 1):
-            if is_hopeless(s, r, lengths, slack, i, p, window[i] / s.agents[i].ability):
+            if is_hopeless(s, r, lengths, slack, i, p, work[i] / s.agents[i].ability):
                 continue
             arrives, latest, _ = place_between(s, r, routes, lengths, slack, i, p, j)
             if arrives >= s.tasks[j].deadline:
@@ -166,22 +203,36 @@ def insert_coalition(s: Situation, r: Schedule, routes: Ints, lengths: Ints, sla
                     break
                 continue
             until = min(latest, s.tasks[j].deadline)
-            if (until - arrives) * s.agents[i].ability > window[i]:
-                window[i] = (until - arrives) * s.agents[i].ability
+            if (until - arrives) * s.agents[i].ability > work[i]:
+                work[i] = (until - arrives) * s.agents[i].ability
                 place[i], arrival[i], limit[i] = p, arrives, until
-    order = np.argsort(-window)
+
+
+@compiled_in_place
+def _insert_fewest(
+    s: Situation,
+    r: Schedule,
+    routes: Ints,
+    lengths: Ints,
+    slack: Floats,
+    j: int,
+    windows: Windows,
+    order: Ints,
+) -> bool:
+    """Insert a task into the routes of the first agents in `order` that suffice; return whether there are enough."""
+    work, place, arrival, limit = windows
     ability, late, until, first = 0.0, 0.0, np.inf, np.inf
-    for k in range(n):
+    for k in range(len(order)):
         i = order[k]
-        if window[i] <= 0:
+        if work[i] <= 0:
             return False
         ability += s.agents[i].ability
         late += s.agents[i].ability * arrival[i]
         until, first = min(until, limit[i]), min(first, arrival[i])
-        work = hours_of_work(s, j, first, 1.0)
-        end = (work + late) / ability
+        end = (hours_of_work(s, j, first, 1.0) + late) / ability
         if end <= until:
-            for member in order[: k + 1]:
+            for q in range(k + 1):
+                member = order[q]
                 if arrival[member] < end:
                     insert(s, r, routes, lengths, slack, member, place[member], j, end)
             return True

@@ -119,9 +119,7 @@ def rebuild(
         tidy(r, routes, lengths)
     for i in range(len(lengths)):
         find_slack(s, r, routes, lengths, slack, i)
-    has_deadline = False
-    for j in range(m):
-        has_deadline = has_deadline or s.tasks[j].deadline < np.inf
+    has_deadline = _has_deadline(s)
     waiting = _waiting(
         s, routes, lengths, near, has_deadline, MOST_WAITING if is_partial else 0, MOST_NEAR if is_partial else m
     )
@@ -144,7 +142,34 @@ def _waiting(
 ) -> Ints:
     """Return unplanned tasks that are near, and some others, in a random or a heuristic order of insertion."""
     m = len(s.tasks)
-    planned = np.zeros(m, np.bool_)
+    planned, waiting, key = np.zeros(m, np.bool_), np.empty(m, np.int64), np.empty(m)
+    count = _gather(s, routes, lengths, near, has_deadline, others, most_near, planned, waiting, key)
+    return waiting[:count][np.argsort(key[:count])]
+
+
+@compiled_in_place
+def _has_deadline(s: Situation) -> bool:
+    for j in range(len(s.tasks)):  # noqa: SIM110 - compiled
+        if s.tasks[j].deadline < np.inf:
+            return True
+    return False
+
+
+@compiled_in_place
+def _gather(
+    s: Situation,
+    routes: Ints,
+    lengths: Ints,
+    near: Ints,
+    has_deadline: bool,
+    others: int,
+    most_near: int,
+    planned: Bools,
+    waiting: Ints,
+    key: Floats,
+) -> int:
+    """Find the tasks for `_waiting`, each with a key by which they are to be sorted; return their number."""
+    m = len(s.tasks)
     for i in range(len(lengths)):
         for p in range(lengths[i]):
             planned[routes[i, p]] = True
@@ -152,7 +177,6 @@ def _waiting(
     for j in range(m):
         beside += not planned[j] and near[j] == 1
     unplanned = m - planned.sum()
-    waiting, key = np.empty(m, np.int64), np.empty(m)
     count, order = 0, np.random.randint(4)
     chances = others / max(1, unplanned), most_near / max(1, beside), 1.0
     for j in range(m):
@@ -169,7 +193,7 @@ def _waiting(
             if not has_deadline:
                 key[count] = -key[count]
         count += 1
-    return waiting[:count][np.argsort(key[:count])]
+    return count
 
 
 @compiled
