@@ -114,7 +114,7 @@ def draw(rows: list[Row], path: str) -> None:
         axes.loglog(x, y, marker="o", markersize=4, label=f"{method}, {case}", **look)
     ends = np.array([min(row.agents for row in rows), max(row.agents for row in rows)])
     axes.loglog(ends, ends * 8e-6, color="0.6", linewidth=1, label="linear")
-    axes.set(xlabel="agents (100 per task)", ylabel="seconds, npz file to result file, without the program's start")
+    axes.set(xlabel="agents (100 per task)", ylabel="time from npz file to result file, without start-up (s)")
     axes.grid(color="0.9", which="major")
     axes.spines[["top", "right"]].set_visible(False)
     axes.legend(frameon=False, fontsize=8)

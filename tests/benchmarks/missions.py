@@ -140,7 +140,7 @@ def growth(given: argparse.Namespace) -> None:
             row = f"| {agents} | {given.tasks} | {events} | {label} | {taken[-1]:.1f} | {power.sum():.1f} |"
             print(f"{row} {result.tasks_done} | {peak:.1f} |", flush=True)
         axes.loglog(given.agents, taken, marker="o", label=label)
-    axes.set(xlabel="agents", ylabel="seconds of a processor")
+    axes.set(xlabel="agents", ylabel="processor time (s)")
     axes.legend()
     if given.plot:
         figure.savefig(given.plot)

@@ -7,7 +7,7 @@ import numpy as np
 from alloc.allocators.missions.layout import IDLE, NOBODY, TO_TASK, WORKING, MissionArrays
 from alloc.allocators.missions.motion import battery_of, can_fly, distance_between, place_of
 from alloc.allocators.missions.records import Report
-from alloc.allocators.runtime.compiled import compiled_in_place, inlined
+from alloc.allocators.runtime.compiled import inlined
 from alloc.problems.fields import BoolArray, FloatArray, IntArray
 
 MEMORY = 20
