@@ -14,7 +14,7 @@ PICKED = ("cpsat", "milp", "local-search")
 """Methods that `choose` picks from."""
 
 PAIRS_PER_SECOND, LEAST_PAIRS = 30_000, 15_000
-"""Pairs of agent class and task per second of the time limit up to which exact methods are picked, and the least limit."""
+"""Pairs of agent class and task per second up to which exact methods are picked, and the minimum of this limit."""
 
 MOST_PAIRS_SEARCHED = 4_000_000
 """Number of agents times tasks above which the exact methods skip their own searches for plans."""
