@@ -1,4 +1,4 @@
-"""What `mkdocs` calls while it builds the site: pages from elsewhere, links, and a check that nothing is loaded."""
+"""Hooks of `mkdocs`: additional pages, links, and a check that pages load nothing from the network."""
 
 import posixpath
 import re
@@ -30,11 +30,11 @@ REFERENCE = ROOT / "docs" / "reference"
 EXTERNAL = re.compile(
     r"<(?:script|img|iframe|source)\b[^>]*?\bsrc=[\"']?https?:|<link\b(?![^>]*\bcanonical)[^>]*?\bhref=[\"']?https?:"
 )
-"""What makes a browser load something from elsewhere when it shows a page; plain links do not."""
+"""HTML that makes a browser load something from another host; plain links do not."""
 
 
 def on_config(config: MkDocsConfig) -> MkDocsConfig:
-    """Put the pages of all public names into the navigation, by the topics of the page that lists them."""
+    """Add the pages of all public names to the navigation, grouped by the topics of the index."""
     chapters = (REFERENCE / "index.md").read_text(encoding="utf-8").split("\n## ")[1:]
     topics = [
         {chapter.partition("\n")[0]: [f"reference/{page}" for page in re.findall(r"\((\w+/\w+\.md)\)", chapter)]}
@@ -47,7 +47,7 @@ def on_config(config: MkDocsConfig) -> MkDocsConfig:
 
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:
-    """Add the page of all options, files of the repository that stand outside docs/, and notebooks as pages."""
+    """Add the page of all options, files of the repository outside docs/, and notebooks as pages."""
     files.append(File.generated(config, "use/commands.md", content=make_commands.page()))
     examples = [path for path in (ROOT / "examples").rglob("*") if path.suffix in EXAMPLES and is_kept(path)]
     for path in [*(ROOT / name for name in PAGES_OUTSIDE), *examples]:
@@ -60,12 +60,12 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 
 
 def is_kept(path: Path) -> bool:
-    """Whether a file belongs to the repository, and is not left over from a build or a run."""
+    """Return whether a file belongs to the repository instead of being left over from a build or a run."""
     return not any(part in ("build", "__pycache__") or part.endswith(".egg-info") for part in path.parts)
 
 
 def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:
-    """Lead links where their targets stand in the site, and colour commands, which have no prompt, as a shell's."""
+    """Adjust links to the site, and highlight commands, which have no prompt, as shell code."""
     if page.is_homepage:
         page.meta["hide"] = ["navigation"]  # it would have a single entry
     text = site_links(markdown, page.file.src_uri).replace("```console\n", "```bash\n")
@@ -74,7 +74,7 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Fil
 
 
 def site_links(markdown: str, source: str) -> str:
-    """Return the text of a page with links as they are in the site, where a page is called by its title.
+    """Return the text of a page with links adjusted to the site, in which pages are named by their titles.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ def title(path: Path) -> str:
 
 
 def reference_links(markdown: str, source: str, pages: Mapping[str, str]) -> str:
-    """Return the text of a page in which classes of the Python reference are links to their pages.
+    """Return the text of a page in which classes of the Python reference are linked to their pages.
 
     In the reference itself functions are, too; elsewhere their names are often those of commands.
     """

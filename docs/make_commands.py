@@ -1,4 +1,4 @@
-"""Makes the page of all commands and options from the parser of the command line; `hooks.py` puts it into the site."""
+"""Generate the page of all commands and options from the parser of the command line, for `hooks.py`."""
 
 import html
 import re
@@ -14,13 +14,13 @@ Made from the parser of `alloc`: what `alloc COMMAND --help` prints. [The comman
 
 
 def page() -> str:
-    """Return the page, with a chapter for each command."""
+    """Return the page, with a section for each command."""
     commands = typer.main.get_command(app).commands  # type: ignore[attr-defined]
     return "\n".join([HEAD, *(chapter(name, command) for name, command in commands.items())])
 
 
 def chapter(name: str, command: "typer.core.TyperCommand") -> str:
-    """Return the chapter of a command: what it does, its arguments and options, and the examples of its help."""
+    """Return the section of a command: what it does, its arguments and options, and the examples of its help."""
     context = command.make_context(f"alloc {name}", [], resilient_parsing=True)
     summary, _, more = (command.help or "").partition("\n\n")
     lines = [f"## alloc {name}", "", text(summary), ""]
@@ -43,7 +43,7 @@ def chapter(name: str, command: "typer.core.TyperCommand") -> str:
 
 
 def cell(words: str) -> str:
-    """Return words as they may stand in a cell of a table, and as they are: no tags, no columns."""
+    """Escape text for a cell of a Markdown table."""
     return html.escape(" ".join(words.split()), quote=False).replace("|", "&#124;")
 
 

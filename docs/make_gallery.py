@@ -1,4 +1,4 @@
-"""Draws the pictures of docs/data/gallery.md, and the pages beside them: ``python docs/make_gallery.py``."""
+"""Draw the pictures and write the pages of docs/data/gallery.md: ``python docs/make_gallery.py``."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -88,7 +88,7 @@ def runs() -> list[Result]:
 
 
 def mission() -> Course:
-    """Return the course of a mission of six agents, some of which fail, each with local knowledge."""
+    """Return the course of a mission of six agents, with failures and local knowledge."""
     recorder = Recorder(with_knowledge=True)
     drawn = random_mission(MissionParameters(family="failures", agents=6, tasks=12), seed=3)
     return recorder.course(simulate(drawn, "gappo", deadline_ms=None, observe=recorder).result)
@@ -119,7 +119,7 @@ def main() -> None:
 
 
 def reduce_colours(path: Path) -> None:
-    """Write a picture again with 256 colours, at a third of the size."""
+    """Reduce a picture to 256 colours, which takes a third of the size."""
     from PIL import Image
 
     with Image.open(path) as picture:

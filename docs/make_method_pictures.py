@@ -1,4 +1,4 @@
-"""Draws docs/methods/pictures/, one for each method, on one instance: ``python docs/make_method_pictures.py``."""
+"""Draw docs/methods/pictures/, one picture per method on the same instance: ``python docs/make_method_pictures.py``."""
 
 from pathlib import Path
 
@@ -24,7 +24,7 @@ COLOURS = ("#17406d", "#c2571a", "#2f7d4f", "#8a4fa3")
 
 
 def instance() -> Instance:
-    """Return 60 agents with abilities from 1 to 9 and 12 tasks, as much ability as workload, places in a square."""
+    """Return 60 agents with abilities from 1 to 9 and 12 tasks, equal total ability and workload, positions in a square."""
     family = Family(
         agents=60, tasks=12, ability_max=9, dimensions=2, starts="own", integer=True, energy_per_distance=1.0
     )
@@ -32,7 +32,7 @@ def instance() -> Instance:
 
 
 def draw_plan(axes: Axes, result: Result) -> None:
-    """Draw the flights to the tasks; areas are workloads, and tasks that are done late are darker."""
+    """Draw the flights to the tasks; areas are workloads, and later tasks are darker."""
     problem, found = result.instance, result.evaluation
     assert result.allocation is not None
     assert found is not None
@@ -56,7 +56,7 @@ def draw_plan(axes: Axes, result: Result) -> None:
 
 
 def draw_course(axes: Axes, results: dict[str, Result], field: str, bound: float, label: str) -> None:
-    """Draw how a figure of the best plan falls over time; the dashed line is the proven bound, or the best known."""
+    """Draw an objective of the best plan over time; the dashed line is the proven bound, or the best known value."""
     for colour, (method, result) in zip(COLOURS, results.items(), strict=False):
         times = [max(point.time_s, 1e-3) for point in result.trace]
         values = [getattr(point, field) for point in result.trace]
@@ -69,7 +69,7 @@ def draw_course(axes: Axes, results: dict[str, Result], field: str, bound: float
 
 
 def draw(results: dict[str, Result], best: Result, path: Path) -> None:
-    """Draw the plan of the first method, and the courses of all."""
+    """Draw the plan of the first method, and the progress of all."""
     figure = Figure(figsize=(9, 3.9), layout="constrained")
     FigureCanvasAgg(figure)
     grid = figure.add_gridspec(2, 2, width_ratios=(1, 1.25))
@@ -87,7 +87,7 @@ def draw(results: dict[str, Result], best: Result, path: Path) -> None:
 
 
 def main() -> None:
-    """Solve the instance by all methods, and draw them."""
+    """Solve the instance by all methods, and draw the results."""
     FOLDER.mkdir(exist_ok=True)
     problem = instance()
     found = {

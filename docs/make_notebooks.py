@@ -1,4 +1,4 @@
-"""Makes pages of the notebooks, as they were executed; `hooks.py` puts them into the site."""
+"""Convert the executed notebooks to Markdown pages, which `hooks.py` adds to the site."""
 
 import base64
 import json
@@ -8,7 +8,7 @@ from typing import TypedDict
 
 
 class Cell(TypedDict):
-    """A cell, as the file has it."""
+    """A cell of a notebook file."""
 
     cell_type: str
     source: list[str]
@@ -16,7 +16,7 @@ class Cell(TypedDict):
 
 
 def page(path: Path) -> tuple[str, dict[str, bytes]]:
-    """Return a notebook as Markdown, and its pictures by the names that the page has for them."""
+    """Return a notebook as Markdown, and its pictures by their names on the page."""
     pictures: dict[str, bytes] = {}
     parts: list[str] = []
     for cell in json.loads(path.read_text(encoding="utf-8"))["cells"]:
@@ -30,7 +30,7 @@ def page(path: Path) -> tuple[str, dict[str, bytes]]:
 
 
 def outputs(cell: Cell, stem: str, pictures: dict[str, bytes]) -> Iterator[str]:
-    """Yield what a cell printed or returned; pictures are added to `pictures`."""
+    """Yield the outputs of a cell as Markdown; add its pictures to `pictures`."""
     for output in cell["outputs"]:
         data = output.get("data", {})
         assert isinstance(data, dict)

@@ -1,4 +1,4 @@
-"""Writes docs/reference/, a page for each public name, from their docstrings: ``python docs/make_reference.py``."""
+"""Generate docs/reference/, a page per public name, from docstrings: ``python docs/make_reference.py``."""
 
 import dataclasses
 import enum
@@ -46,7 +46,7 @@ TOPICS = {
     "Policies of missions, and the planner": ("alloc.allocators.online",),
     "Errors": ("alloc.problems.errors",),
 }
-"""Where a name stands in the table of all: by the longest of these that the module which defines it begins with."""
+"""Topics of the index by prefixes of module names; the longest matching prefix counts."""
 
 SECTION = re.compile(r"^(\w[\w ]*)\n-{3,}\n", re.MULTILINE)
 """A heading of a section in a docstring of numpydoc style."""
@@ -60,7 +60,7 @@ the names at work. All else is reachable by its module, and may change.
 
 
 def pages() -> dict[str, str]:
-    """Return the text of each page by its place in docs/reference/; that of the table of all names comes first."""
+    """Return the text of each page by its path in docs/reference/; the index comes first."""
     origins = {name: module for module in reversed(MODULES) for name in importlib.import_module(module).__all__}
     names = {name: getattr(importlib.import_module(origins[name]), name) for name in sorted(origins, key=str.casefold)}
     by_topic = {title: [name for name in names if topic(names[name]) == title] for title in TOPICS}
@@ -69,14 +69,14 @@ def pages() -> dict[str, str]:
 
 
 def topic(value: object) -> str:
-    """Return the topic of a public name; constants, which do not know their modules, are those of allocations."""
+    """Return the topic of a public name; constants, whose modules are unknown, belong to allocations."""
     module = getattr(value, "__module__", "alloc.problems.allocation")
     known = {prefix: title for title, prefixes in TOPICS.items() for prefix in prefixes if module.startswith(prefix)}
     return known[max(known, key=len)]
 
 
 def place(name: str, value: object) -> str:
-    """Return the page of a name; `WhatIf` and `whatif` are one file where names of files have no case."""
+    """Return the path of a page; `WhatIf` and `whatif` would collide on file systems that ignore case."""
     return f"{'classes' if isinstance(value, type) else 'functions' if callable(value) else 'constants'}/{name}.md"
 
 
@@ -87,13 +87,13 @@ def table(title: str, names: list[str], values: Mapping[str, object]) -> str:
 
 
 def summary(value: object) -> str:
-    """Return the first paragraph of a docstring, which is one line, or the value of a constant."""
+    """Return the summary line of a docstring, or the value of a constant."""
     first = (inspect.getdoc(value) or "").partition("\n\n")[0] if callable(value) else f"`{value!r}`"
     return first.replace("\n", " ").replace("|", "\\|")
 
 
 def entry(path: str, value: object) -> str:
-    """Return the page of one name: how it is called, its docstring, and its public methods or members."""
+    """Return the page of a name: its signature, its docstring, and its public methods or members."""
     name = path.rpartition(".")[2]
     lines = [f"# {name}", ""]
     if not callable(value):
@@ -105,7 +105,7 @@ def entry(path: str, value: object) -> str:
 
 
 def signature(name: str, value: Callable[..., object]) -> str:
-    """Return how a function or class is called, without types; long ones have a line for each parameter."""
+    """Return the signature of a function or class without types; long ones have a line per parameter."""
     if isinstance(value, type) and issubclass(value, enum.Enum):
         return f"{name}(value)"
     if isinstance(value, type) and issubclass(value, Exception) and "__init__" not in vars(value):
@@ -116,7 +116,7 @@ def signature(name: str, value: Callable[..., object]) -> str:
 
 
 def arguments(value: Callable[..., object]) -> list[str]:
-    """Return the parameters of a function or class as they are written, with their defaults but without types."""
+    """Return the parameters of a function or class with their defaults but without types."""
     kinds = inspect.Parameter
     parts: list[str] = []
     for name, parameter in inspect.signature(value).parameters.items():
@@ -130,7 +130,7 @@ def arguments(value: Callable[..., object]) -> list[str]:
 
 
 def default(value: object) -> str:
-    """Return a default as it is written; those that are made anew for each call, or are objects, are dots."""
+    """Return a default as source code; defaults that are factories or objects become dots."""
     if isinstance(value, enum.Enum):
         return repr(value.value)
     text = repr(value)
@@ -138,7 +138,7 @@ def default(value: object) -> str:
 
 
 def markdown(docstring: str) -> list[str]:
-    """Return a docstring of numpydoc style as lines of Markdown."""
+    """Convert a numpydoc docstring to lines of Markdown."""
     pieces = SECTION.split(docstring)
     lines = [pieces[0].strip(), ""]
     for title, text in zip(pieces[1::2], pieces[2::2], strict=True):
@@ -147,13 +147,13 @@ def markdown(docstring: str) -> list[str]:
 
 
 def is_list(text: str) -> bool:
-    """Return whether a section is a list of names or types, each with an indented explanation, not plain text."""
+    """Return whether a section is a list of names or types with indented explanations instead of plain text."""
     first = text.strip("\n").splitlines()[0] if text.strip() else ""
     return " : " in first or "\n    " in text or re.fullmatch(r"[\w, ]+", first) is not None
 
 
 def items(text: str) -> Iterator[str]:
-    """Yield an item for each name of a section, its explanation on the same line."""
+    """Yield an item for each name of a section, with its explanation on the same line."""
     for part in re.split(r"\n(?=\S)", text.strip("\n")):
         head, _, explanation = part.partition("\n")
         name, colon, kind = head.partition(" : ")
@@ -182,7 +182,7 @@ def members(kind: type) -> Iterator[str]:
 
 
 def is_own(kind: type, name: str) -> bool:
-    """Return whether a class of this project defines the name, not one of Python's."""
+    """Return whether the name is defined by a class of this project rather than of Python."""
     return any(name in vars(base) for base in kind.__mro__ if base.__module__.startswith("alloc."))
 
 
