@@ -24,7 +24,7 @@ COLOURS = ("#17406d", "#c2571a", "#2f7d4f", "#8a4fa3")
 
 
 def instance() -> Instance:
-    """Return 60 agents with abilities from 1 to 9 and 12 tasks, equal total ability and workload, positions in a square."""
+    """Return 60 agents with abilities from 1 to 9 and 12 tasks, with equal total ability and workload, in a square."""
     family = Family(
         agents=60, tasks=12, ability_max=9, dimensions=2, starts="own", integer=True, energy_per_distance=1.0
     )
