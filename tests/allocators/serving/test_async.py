@@ -110,6 +110,14 @@ async def cancelled_after(instance: Instance, method: object, seconds: float, ob
     return None
 
 
+def require_ended(before: int) -> None:
+    """Wait until no more threads run than `before`: on a busy machine native solvers stop later than their runs."""
+    limit = time.monotonic() + LATEST_S
+    while threading.active_count() > before:
+        assert time.monotonic() < limit, threading.enumerate()
+        time.sleep(0.01)
+
+
 @pytest.mark.parametrize("name", list(registry.BUILT_IN))
 def test_cancelled_runs_leave_no_thread(name: str) -> None:
     """Every method ends soon after it is cancelled, and as many threads as before run then.
@@ -121,7 +129,7 @@ def test_cancelled_runs_leave_no_thread(name: str) -> None:
         late = asyncio.run(cancelled_after(HARD, method, seconds, "makespan-energy"))
         assert late is None or late < 0.5
         cancelled += late is not None
-        assert threading.active_count() == before
+        require_ended(before)
     assert cancelled
 
 
@@ -136,6 +144,6 @@ def test_runs_cancelled_at_random_times_leave_no_thread() -> None:
         run = cancelled_after(paper(1, seed=number), rng.choice(methods), rng.uniform(0, 0.3), objective)
         late = asyncio.run(run)
         times += [] if late is None else [late]
-        assert threading.active_count() == before
+        require_ended(before)
     assert len(times) >= 50
     assert sorted(times)[-4] < 0.1
