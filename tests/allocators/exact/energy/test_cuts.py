@@ -239,7 +239,7 @@ def test_bound_with_cuts_reaches_the_least_cost_with_an_integer_mixture():
 
 @pytest.mark.parametrize(("most", "bound"), [(1000, 5.0), (1, 4.5)])
 def test_longer_searches_for_groups_are_tried_before_cuts_over_classes_are_removed(most, bound, monkeypatch):
-    """Searches of one node lose so much that cuts are of no use; those cuts are removed if searches may not be longer."""
+    """Searches of one node lose so much that cuts are of no use; they are removed if searches may not be longer."""
     monkeypatch.setattr(cutting_planes, "FIRST_NODES", 1)
     monkeypatch.setattr(cutting_planes, "MOST_NODES", most)
     model, groups = three_for_two()
