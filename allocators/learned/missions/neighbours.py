@@ -109,7 +109,7 @@ def foresee(situation: Situation, swap: Swap, look: FloatArray, room: Scratch, w
 @inlined
 def needs_foresight(own: FloatArray) -> bool:
     """Whether choices are to be predicted: not for an agent that has a task, which it usually keeps."""
-    return own[known.METRIC] != known.OTHER_WAYS and own[known.TARGET] < 0
+    return bool(own[known.METRIC] != known.OTHER_WAYS and own[known.TARGET] < 0)
 
 
 @compiled_in_place

@@ -250,4 +250,4 @@ def nearer(together: Together, i: int, task: int) -> int:
     for place in range(together.idle[-1]):
         found += gaps[place] < limit
     place = together.column[i]
-    return found - (place != NOBODY and gaps[place] < limit)
+    return int(found - (place != NOBODY and gaps[place] < limit))
