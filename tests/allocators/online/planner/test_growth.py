@@ -179,4 +179,4 @@ def test_routes_of_agents_that_are_gone_are_forgotten(few):
         )
         for number in range(3, 40):
             exchange(planner, number)
-        assert len(planner._leader._agents["lasting"]._announced.routes) <= 2 * (4 + FEW)
+        assert len(planner._runner._agents["lasting"]._announced.routes) <= 2 * (4 + FEW)
