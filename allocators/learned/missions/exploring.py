@@ -32,7 +32,7 @@ def centre(area: FloatArray, cell: int) -> tuple[float, float, float]:
 
 
 @compiled_in_place
-def notice(area: FloatArray, sensing: float, x: float, y: float, hour: float, seen: FloatArray) -> None:
+def record_seen(area: FloatArray, sensing: float, x: float, y: float, hour: float, seen: FloatArray) -> None:
     """Record that all cells within the sensing radius of a place were seen at an hour; `seen` has an hour per cell."""
     left, low = area[0, 0], area[0, 1]
     wide, deep = (area[1, 0] - left) / CELLS, (area[1, 1] - low) / CELLS
@@ -75,7 +75,7 @@ def find_unseen(
     for i in range(situation.others[0]):
         if situation.counts[i]:
             at = situation.other[known.OTHER_X, i], situation.other[known.OTHER_Y, i]
-            notice(area, sensing, at[0], at[1], own[known.HOUR] - 1e-3, hours)
+            record_seen(area, sensing, at[0], at[1], own[known.HOUR] - 1e-3, hours)
     best, found = -np.inf, goal
     if goal < 0:
         key = keyed(keyed(first_key(EXPLORING), seed), number)

@@ -19,7 +19,7 @@ from alloc.allocators.runtime.compiled import compiled_in_place, inlined
 from alloc.problems.fields import BoolArray, FloatArray, IntArray
 
 Scratch = tuple[Singles, Singles, Singles, Singles, IntArray]
-"""Options, token, pooled, scores and choice, as in `Room`."""
+"""Options, token, pooled, scores and choice, as in `Buffers`."""
 
 ORDER = (known.STRENGTH, known.CHARGE, known.OTHER_X, known.OTHER_Y)
 """Figures of agents by which the order of decisions is determined, largest first."""
@@ -28,7 +28,7 @@ MOST = 6
 """Maximum number of neighbours for which an agent decides."""
 
 
-class Swap(NamedTuple):
+class PeerView(NamedTuple):
     """Storage for an agent's own situation while it decides in the place of another agent.
 
     Attributes
@@ -49,9 +49,9 @@ class Swap(NamedTuple):
     waits: BoolArray
 
 
-def swap_for(n: int, m: int) -> Swap:
+def new_peer_view(n: int, m: int) -> PeerView:
     """Return storage for n agents and m tasks."""
-    return Swap(
+    return PeerView(
         np.zeros(known.OWN), np.zeros((known.OTHER, 2)), np.zeros(m), np.zeros(m, np.bool_), np.zeros(n, np.bool_)
     )
 
@@ -70,7 +70,9 @@ def precedes(one: FloatArray, i: int, other: FloatArray, k: int) -> bool:
 
 
 @compiled_in_place
-def foresee(situation: Situation, swap: Swap, look: FloatArray, room: Scratch, weights: MissionWeights) -> int:
+def predict_neighbours(
+    situation: Situation, peer: PeerView, look: FloatArray, buffers: Scratch, weights: MissionWeights
+) -> int:
     """Write the predicted choices of free neighbours that decide before an agent without a task; return their number.
 
     Agents that were free when last heard of have decided since; of those that are free now, the ones that precede the
@@ -79,19 +81,19 @@ def foresee(situation: Situation, swap: Swap, look: FloatArray, room: Scratch, w
     Parameters
     ----------
     situation : Situation
-    swap : Swap
+    peer : PeerView
     look : ndarray, shape (3,)
         See `fill_options`; the agent's own knowledge of places to explore is used for others as well.
-    room : Scratch
+    buffers : Scratch
     weights : MissionWeights
     """
-    own, other, waits = situation.own, situation.other, swap.waits
-    step_out(situation, swap)
+    own, other, waits = situation.own, situation.other, peer.waits
+    save_own(situation, peer)
     found = 0
     for i in range(situation.others[0]):
         waits[i] = situation.counts[i] and situation.target[i] == NOBODY and other[known.IS_FREE, i] > 0
         if waits[i] and other[known.HEARD, i] >= own[known.HOUR]:
-            waits[i] = precedes(other, i, swap.other, 0)
+            waits[i] = precedes(other, i, peer.other, 0)
         found += waits[i]
     decided = min(found, MOST)
     for _ in range(decided):
@@ -100,26 +102,26 @@ def foresee(situation: Situation, swap: Swap, look: FloatArray, room: Scratch, w
             if waits[i] and (first < 0 or precedes(other, i, other, first)):
                 first = i
         waits[first] = False
-        decide_for(situation, swap, first, look, room, weights)
+        predict_choice(situation, peer, first, look, buffers, weights)
     if decided:
-        step_in(situation, swap)
+        restore_own(situation, peer)
     return decided
 
 
 @inlined
-def needs_foresight(own: FloatArray) -> bool:
-    """Whether choices are to be predicted: not for an agent that has a task, which it usually keeps."""
+def needs_prediction(own: FloatArray) -> bool:
+    """Return whether to predict choices of others; an agent with a task usually keeps it, and needs no predictions."""
     return bool(own[known.METRIC] != known.OTHER_WAYS and own[known.TARGET] < 0)
 
 
 @compiled_in_place
-def step_out(situation: Situation, swap: Swap) -> None:
+def save_own(situation: Situation, peer: PeerView) -> None:
     """Store the agent's own situation, and enter the agent as others see it."""
-    own, mine = situation.own, swap.other
+    own, mine = situation.own, peer.other
     for number in range(known.OWN):
-        swap.own[number] = own[number]
-    for j in range(len(swap.can)):
-        swap.distance[j], swap.can[j] = situation.task[known.DISTANCE, j], situation.can[j]
+        peer.own[number] = own[number]
+    for j in range(len(peer.can)):
+        peer.distance[j], peer.can[j] = situation.task[known.DISTANCE, j], situation.can[j]
     mine[known.STRENGTH, 0], mine[known.PACE, 0] = own[known.ABILITY], own[known.SPEED]
     mine[known.CHARGE, 0], mine[known.PRICE, 0] = own[known.BATTERY], own[known.ENERGY_PER_DISTANCE]
     mine[known.OTHER_X, 0], mine[known.OTHER_Y, 0], mine[known.OTHER_Z, 0] = own[known.X], own[known.Y], own[known.Z]
@@ -127,41 +129,41 @@ def step_out(situation: Situation, swap: Swap) -> None:
 
 
 @compiled_in_place
-def step_in(situation: Situation, swap: Swap) -> None:
+def restore_own(situation: Situation, peer: PeerView) -> None:
     """Restore the agent's own situation."""
     for number in range(known.OWN):
-        situation.own[number] = swap.own[number]
-    for j in range(len(swap.can)):
-        situation.task[known.DISTANCE, j], situation.can[j] = swap.distance[j], swap.can[j]
+        situation.own[number] = peer.own[number]
+    for j in range(len(peer.can)):
+        situation.task[known.DISTANCE, j], situation.can[j] = peer.distance[j], peer.can[j]
 
 
 @compiled_in_place
-def decide_for(
-    situation: Situation, swap: Swap, i: int, look: FloatArray, room: Scratch, weights: MissionWeights
+def predict_choice(
+    situation: Situation, peer: PeerView, i: int, look: FloatArray, buffers: Scratch, weights: MissionWeights
 ) -> None:
     """Write the predicted choice of a neighbour, in whose place among the others the agent is meanwhile."""
     own, other, task = situation.own, situation.other, situation.task
-    options, token, pooled, scores, choice = room
+    options, token, pooled, scores, choice = buffers
     own[known.X], own[known.Y], own[known.Z] = other[known.OTHER_X, i], other[known.OTHER_Y, i], other[known.OTHER_Z, i]
     own[known.ABILITY], own[known.SPEED] = other[known.STRENGTH, i], other[known.PACE, i]
     own[known.BATTERY], own[known.ENERGY_PER_DISTANCE] = other[known.CHARGE, i], other[known.PRICE, i]
     own[known.IS_FLYING] = 0.0
     here = own[known.X], own[known.Y], own[known.Z]
     is_manhattan = own[known.METRIC] == known.MANHATTAN_WAYS
-    for j in range(len(swap.can)):
-        if swap.can[j]:
+    for j in range(len(peer.can)):
+        if peer.can[j]:
             place = task[known.TASK_X, j], task[known.TASK_Y, j], task[known.TASK_Z, j]
             way = distance_between(is_manhattan, here, place)
             task[known.DISTANCE, j] = way
             situation.can[j] = own[known.ENERGY_PER_DISTANCE] * way <= own[known.BATTERY]
     for number in range(known.OTHER):
-        swap.other[number, 1] = other[number, i]
-        other[number, i] = swap.other[number, 0]
+        peer.other[number, 1] = other[number, i]
+        other[number, i] = peer.other[number, 0]
     count = fill_options(situation, look, options, choice)
     score(options, count, weights, token, pooled, scores)
     chosen = choice[np.argmax(scores[:count])]
     for number in range(known.OTHER):
-        other[number, i] = swap.other[number, 1]
+        other[number, i] = peer.other[number, 1]
     situation.target[i] = NOBODY
     if chosen >= 0:
         situation.target[i] = chosen

@@ -5,13 +5,13 @@ import numpy as np
 from alloc.allocators.learned.missions import feature_names as names
 from alloc.allocators.learned.missions import situation as known
 from alloc.allocators.learned.missions.network_arrays import Singles
-from alloc.allocators.learned.missions.situation import Coming, Situation
+from alloc.allocators.learned.missions.situation import Expected, Situation
 from alloc.allocators.missions.layout import NOBODY
 from alloc.allocators.missions.motion import Point
 from alloc.allocators.runtime.compiled import compiled_in_place, inlined
 from alloc.problems.fields import FloatArray, IntArray
 
-LOOK, WAIT = -1, -2
+EXPLORE, WAIT = -1, -2
 """Options other than tasks: to explore, and to stay."""
 
 NEAR = 0.15
@@ -47,29 +47,29 @@ def expect(situation: Situation) -> int:
 
     Only tasks that the agent can take are considered.
     """
-    coming, arrives, target = situation.coming, situation.other[known.ARRIVES], situation.target
-    coming.first[:] = NOBODY
+    expected, arrives, target = situation.expected, situation.other[known.ARRIVES], situation.target
+    expected.first[:] = NOBODY
     found = 0
     for i in range(situation.others[0]):
         if not situation.counts[i]:
             continue
         if target[i] == NOBODY:
-            coming.idle[found] = i
+            expected.idle[found] = i
             for axis in range(3):
-                coming.idle_places[axis, found] = situation.other[known.OTHER_X + axis, i]
+                expected.idle_places[axis, found] = situation.other[known.OTHER_X + axis, i]
             found += 1
         else:
-            queue(coming, arrives, target[i], i)
+            insert_arrival(expected, arrives, target[i], i)
     for j in range(len(situation.can)):
         if situation.can[j]:
-            coming.others[j], coming.without[j] = done_without(situation, j)
+            expected.others[j], expected.without[j] = completion_without(situation, j)
     return found
 
 
 @inlined
-def queue(coming: Coming, arrives: FloatArray, j: int, i: int) -> None:
+def insert_arrival(expected: Expected, arrives: FloatArray, j: int, i: int) -> None:
     """Insert another agent that comes to a task after those that arrive no later, usually at the end."""
-    first, following, last, working = coming.first, coming.following, coming.last, coming.working
+    first, following, last, working = expected.first, expected.following, expected.last, expected.working
     before, after = NOBODY, first[j]
     if after != NOBODY and arrives[last[j]] <= arrives[i]:
         before, after = last[j], NOBODY
@@ -89,15 +89,15 @@ def queue(coming: Coming, arrives: FloatArray, j: int, i: int) -> None:
 
 
 @inlined
-def done_without(situation: Situation, j: int) -> tuple[int, float]:
+def completion_without(situation: Situation, j: int) -> tuple[int, float]:
     """Return how many other agents come to a task, and the hour at which they complete it."""
     arrives, strength, following = (
         situation.other[known.ARRIVES],
         situation.other[known.STRENGTH],
-        situation.coming.following,
+        situation.expected.following,
     )
     left, since = situation.task[known.LEFT, j], situation.task[known.KNOWN_AT, j]
-    others, rate, work, hour, i = 0, 0.0, 0.0, np.inf, situation.coming.first[j]
+    others, rate, work, hour, i = 0, 0.0, 0.0, np.inf, situation.expected.first[j]
     while i != NOBODY:
         others += 1
         begin = max(arrives[i], since)
@@ -110,16 +110,16 @@ def done_without(situation: Situation, j: int) -> tuple[int, float]:
 
 
 @inlined
-def done_with(situation: Situation, j: int, arrival: float, left: float) -> float:
+def completion_with(situation: Situation, j: int, arrival: float, left: float) -> float:
     """Return the hour at which a task is done if the agent arrives at `arrival`, together with the other agents."""
     arrives, strength, following = (
         situation.other[known.ARRIVES],
         situation.other[known.STRENGTH],
-        situation.coming.following,
+        situation.expected.following,
     )
     ability, since = situation.own[known.ABILITY], situation.task[known.KNOWN_AT, j]
     rate = work = 0.0
-    hour, i, is_in = np.inf, situation.coming.first[j], False
+    hour, i, is_in = np.inf, situation.expected.first[j], False
     while i != NOBODY or not is_in:
         is_next = not is_in and (i == NOBODY or arrives[i] > arrival)
         begin = max(arrival if is_next else arrives[i], since)
@@ -147,7 +147,7 @@ def fill_options(situation: Situation, look: FloatArray, options: Singles, choic
         Whether it can explore, and the distance of that place and the time since it was last seen, both from 0 to 1.
     options : ndarray, shape (m + 2, FEATURES)
     choice : ndarray of int, shape (m + 2,)
-        Task of each option, `LOOK` or `WAIT`.
+        Task of each option, `EXPLORE` or `WAIT`.
     """
     idle = expect(situation)
     count = 0
@@ -157,7 +157,7 @@ def fill_options(situation: Situation, look: FloatArray, options: Singles, choic
             count += 1
     tasks, scale = count, time_scale(situation.own)
     if look[0]:
-        choice[count] = LOOK
+        choice[count] = EXPLORE
         count += 1
     choice[count] = WAIT
     count += 1
@@ -167,7 +167,7 @@ def fill_options(situation: Situation, look: FloatArray, options: Singles, choic
     fill_crowding(situation, choice[:tasks], options)
     for row in range(tasks, count):
         option = options[row]
-        if choice[row] == LOOK:
+        if choice[row] == EXPLORE:
             option[names.TRAVEL], option[names.UNSEEN], option[names.EXPLORES] = look[1], look[2], 1
             option[names.IS_ORDER] = situation.own[known.IS_FLYING] and situation.own[known.TARGET] < 0
         else:
@@ -180,7 +180,7 @@ def fill_options(situation: Situation, look: FloatArray, options: Singles, choic
 def fill_task(situation: Situation, j: int, option: Singles, idle: int, scale: float) -> None:
     """Write the features of a task; `scale` is the unit of times."""
     own, task = situation.own, situation.task
-    others, without = situation.coming.others[j], situation.coming.without[j]
+    others, without = situation.expected.others[j], situation.expected.without[j]
     hour = own[known.HOUR]
     is_order = own[known.TARGET] == j
     is_there = is_order and own[known.IS_WORKING] > 0
@@ -189,7 +189,7 @@ def fill_task(situation: Situation, j: int, option: Singles, idle: int, scale: f
     left = task[known.LEFT, j]
     if others == 0 and not is_there:
         left += task[known.GROWTH, j] * (arrival - task[known.KNOWN_AT, j])
-    with_me = max(hour, done_with(situation, j, arrival, left))
+    with_me = max(hour, completion_with(situation, j, arrival, left))
     option[names.TRAVEL] = min(distance / own[known.SPAN], 2.0) if own[known.SPAN] > 0 else 0.0
     option[names.WITH_ME] = squashed(with_me - hour, scale)
     option[names.WITHOUT] = squashed(max(0.0, without - hour), scale)
@@ -216,7 +216,7 @@ def rivals(situation: Situation, j: int, distance: float, idle: int) -> int:
     """Return how many other agents without a task are nearer to a task."""
     x, y, z = situation.task[known.TASK_X, j], situation.task[known.TASK_Y, j], situation.task[known.TASK_Z, j]
     is_manhattan = situation.own[known.METRIC] == known.MANHATTAN_WAYS
-    return nearer(situation.coming.idle_places, idle, (x, y, z), distance, is_manhattan)
+    return nearer(situation.expected.idle_places, idle, (x, y, z), distance, is_manhattan)
 
 
 @inlined
@@ -236,7 +236,7 @@ def nearer(places: FloatArray, count: int, to: Point, distance: float, is_manhat
 def fill_crowding(situation: Situation, tasks: IntArray, options: Singles) -> None:
     """Write the amount of other work near each task."""
     task, near = situation.task, NEAR * situation.own[known.SPAN]
-    places = situation.coming.task_places
+    places = situation.expected.task_places
     for row in range(len(tasks)):
         for axis in range(3):
             places[axis, row] = task[known.TASK_X + axis, tasks[row]]

@@ -4,13 +4,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from alloc.allocators.learned.missions.exploring import CELLS, centre, find_unseen, notice
+from alloc.allocators.learned.missions.exploring import CELLS, centre, find_unseen, record_seen
 from alloc.allocators.learned.missions.forward import score
-from alloc.allocators.learned.missions.neighbours import Swap, foresee, needs_foresight, swap_for
+from alloc.allocators.learned.missions.messages import MOST_SAVED, should_send
+from alloc.allocators.learned.missions.neighbours import PeerView, needs_prediction, new_peer_view, predict_neighbours
 from alloc.allocators.learned.missions.network_arrays import HIDDEN, WIDTH, MissionWeights, Singles
 from alloc.allocators.learned.missions.options import WAIT, fill_options
 from alloc.allocators.learned.missions.situation import IS_FLYING, TARGET, Situation, empty, fill
-from alloc.allocators.learned.missions.talking import MOST_SAVED, is_to_send
 from alloc.allocators.missions.advance import advance
 from alloc.allocators.missions.channel import is_silent
 from alloc.allocators.missions.layout import (
@@ -33,13 +33,13 @@ REVIEW = 10
 """Number of radio periods after which a busy agent reconsiders its options without other cause."""
 
 
-class Room(NamedTuple):
+class Buffers(NamedTuple):
     """Workspace of decisions, and the memory of agents between them.
 
     Attributes
     ----------
     situation : Situation
-    swap : Swap
+    peer : PeerView
     options, token, pooled, scores : ndarray
         See `score`.
     choice : ndarray of int
@@ -57,11 +57,11 @@ class Room(NamedTuple):
         Number of open tasks that it knew then.
     periods : int
     saved, counted, news : ndarray of int, shape (n,)
-        See `is_to_send`.
+        See `should_send`.
     """
 
     situation: Situation
-    swap: Swap
+    peer: PeerView
     options: Singles
     token: Singles
     pooled: Singles
@@ -79,11 +79,11 @@ class Room(NamedTuple):
     news: IntArray
 
 
-def room_for(n: int, m: int, periods: int = 1) -> Room:
+def new_buffers(n: int, m: int, periods: int = 1) -> Buffers:
     """Return a workspace for n agents, which send a message every `periods` radio periods, and m tasks."""
-    return Room(
+    return Buffers(
         situation=empty(n, m),
-        swap=swap_for(n, m),
+        peer=new_peer_view(n, m),
         options=np.zeros((m + 2, WIDTH), np.float32),
         token=np.zeros((m + 2, HIDDEN), np.float32),
         pooled=np.zeros((2, HIDDEN), np.float32),
@@ -103,20 +103,20 @@ def room_for(n: int, m: int, periods: int = 1) -> Room:
 
 
 @inlined
-def is_due(room: Room, number: int, hour: float, period: float, tasks: int, is_busy: bool) -> bool:
+def is_due(buffers: Buffers, number: int, hour: float, period: float, tasks: int, is_busy: bool) -> bool:
     """Return whether an agent should consider its options: it is idle, knows other tasks, or a review is due."""
-    return not is_busy or tasks != room.tasks[number] or hour - room.decided[number] >= REVIEW * period
+    return not is_busy or tasks != buffers.tasks[number] or hour - buffers.decided[number] >= REVIEW * period
 
 
 @inlined
 def score_options(
-    room: Room, area: FloatArray, sensing: float, seed: int, number: int, row: int, weights: MissionWeights
+    buffers: Buffers, area: FloatArray, sensing: float, seed: int, number: int, row: int, weights: MissionWeights
 ) -> int:
-    """Return the number of options of an agent in the given situation, and write their scores into `room`.
+    """Return the number of options of an agent in the given situation, and write their scores into `buffers`.
 
     Parameters
     ----------
-    room : Room
+    buffers : Buffers
     area : ndarray, shape (2, 3)
     sensing : float
         Sensing radius; ``inf`` without exploration. An agent that has a task does not explore.
@@ -126,28 +126,30 @@ def score_options(
         Row of the agent in the memory.
     weights : MissionWeights
     """
-    own = room.situation.own
-    room.look[:] = 0.0
+    own = buffers.situation.own
+    buffers.look[:] = 0.0
     target = int(own[TARGET])
-    if sensing < np.inf and (target < 0 or not room.situation.can[target]):
-        goal = room.goal[row] if own[TARGET] < 0 and own[IS_FLYING] > 0 else -1
+    if sensing < np.inf and (target < 0 or not buffers.situation.can[target]):
+        goal = buffers.goal[row] if own[TARGET] < 0 and own[IS_FLYING] > 0 else -1
         for cell in range(CELLS * CELLS):
-            room.last[0, cell] = room.seen[row, cell]
-        room.goal[row] = find_unseen(room.situation, area, sensing, room.last, seed, number, goal, room.look)
-    scratch = room.options, room.token, room.pooled, room.scores, room.choice
-    if needs_foresight(own):
-        foresee(room.situation, room.swap, room.look, scratch, weights)
-    count = fill_options(room.situation, room.look, room.options, room.choice)
-    score(room.options, count, weights, room.token, room.pooled, room.scores)
+            buffers.last[0, cell] = buffers.seen[row, cell]
+        buffers.goal[row] = find_unseen(
+            buffers.situation, area, sensing, buffers.last, seed, number, goal, buffers.look
+        )
+    scratch = buffers.options, buffers.token, buffers.pooled, buffers.scores, buffers.choice
+    if needs_prediction(own):
+        predict_neighbours(buffers.situation, buffers.peer, buffers.look, scratch, weights)
+    count = fill_options(buffers.situation, buffers.look, buffers.options, buffers.choice)
+    score(buffers.options, count, weights, buffers.token, buffers.pooled, buffers.scores)
     return count
 
 
 @compiled_in_place
-def consider(
-    room: Room, area: FloatArray, sensing: float, seed: int, number: int, row: int, weights: MissionWeights
+def score_options_compiled(
+    buffers: Buffers, area: FloatArray, sensing: float, seed: int, number: int, row: int, weights: MissionWeights
 ) -> int:
     """Do the same as `score_options`, for callers that are not compiled."""
-    return score_options(room, area, sensing, seed, number, row, weights)
+    return score_options(buffers, area, sensing, seed, number, row, weights)
 
 
 @inlined
@@ -169,62 +171,62 @@ def is_busy(state: MissionArrays, number: int) -> bool:
 
 
 @inlined
-def note_choice(room: Room, row: int, choice: int) -> None:
+def record_change(buffers: Buffers, row: int, choice: int) -> None:
     """Record news for other agents if a choice differs from the last order."""
-    if max(choice, NOBODY) != int(room.situation.own[TARGET]):
-        room.news[row] = 1
+    if max(choice, NOBODY) != int(buffers.situation.own[TARGET]):
+        buffers.news[row] = 1
 
 
 @inlined
-def talk(state: MissionArrays, room: Room) -> None:
+def choose_senders(state: MissionArrays, buffers: Buffers) -> None:
     """Set which agents send a message now."""
     head = state.head[0]
     for number in range(len(state.agents)):
         agent = state.agents[number]
         agent.speaks = 0
         if IDLE <= agent.status <= WORKING and not (head.silences and is_silent(state, number)):
-            agent.speaks = is_to_send(room.periods, room.saved, room.counted, room.news, number, head.tick)
+            agent.speaks = should_send(buffers.periods, buffers.saved, buffers.counted, buffers.news, number, head.tick)
 
 
 @inlined
-def act(state: MissionArrays, room: Room, number: int, choice: int) -> None:
+def give_order(state: MissionArrays, buffers: Buffers, number: int, choice: int) -> None:
     """Give the agent the order for its choice."""
     agent = state.agents[number]
     nowhere = (0.0, 0.0, 0.0)
-    note_choice(room, number, choice)
+    record_change(buffers, number, choice)
     if choice >= 0:
         order(state, number, TO_TASK, choice, nowhere)
     elif choice == WAIT:
         order(state, number, STAY, -1, nowhere)
     elif agent.order != TO_PLACE:
-        order(state, number, TO_PLACE, -1, centre(state.area, room.goal[number]))
+        order(state, number, TO_PLACE, -1, centre(state.area, buffers.goal[number]))
 
 
 @inlined
-def wants(state: MissionArrays, room: Room, number: int) -> bool:
+def should_decide(state: MissionArrays, buffers: Buffers, number: int) -> bool:
     """Return whether an agent should consider its options now; record what it sees."""
     head, agent = state.head[0], state.agents[number]
     tasks = open_tasks(state, agent.known)
-    is_considered = is_due(room, number, head.hour, head.period, tasks, is_busy(state, number))
+    is_considered = is_due(buffers, number, head.hour, head.period, tasks, is_busy(state, number))
     if (is_considered or agent.flight != 0) and head.sensing < np.inf and head.is_local:
         x, y, _ = place_of(agent, head.hour)
-        notice(state.area, head.sensing, x, y, head.hour, room.seen[number])
+        record_seen(state.area, head.sensing, x, y, head.hour, buffers.seen[number])
     if not is_considered:
         return False
-    room.decided[number], room.tasks[number] = head.hour, tasks
-    fill(state, number, room.situation)
+    buffers.decided[number], buffers.tasks[number] = head.hour, tasks
+    fill(state, number, buffers.situation)
     return True
 
 
 @compiled_in_place
-def play(state: MissionArrays, room: Room, weights: MissionWeights, seed: int) -> int:
+def play(state: MissionArrays, buffers: Buffers, weights: MissionWeights, seed: int) -> int:
     """Let the network decide for all agents until the end of a mission; return the number of decisions.
 
     Parameters
     ----------
     state : MissionArrays
-    room : Room
-        Workspace from `room_for`.
+    buffers : Buffers
+        Workspace from `new_buffers`.
     weights : MissionWeights
     seed : int
         Seed of the run.
@@ -236,11 +238,11 @@ def play(state: MissionArrays, room: Room, weights: MissionWeights, seed: int) -
         if wanted == OVER:
             return considered
         if wanted == MESSAGES:
-            talk(state, room)
+            choose_senders(state, buffers)
             continue
         for place in range(head.deciding):
             number = state.deciding[place]
-            if wants(state, room, number):
-                count = score_options(room, state.area, sensing, seed, number, number, weights)
-                act(state, room, number, room.choice[np.argmax(room.scores[:count])])
+            if should_decide(state, buffers, number):
+                count = score_options(buffers, state.area, sensing, seed, number, number, weights)
+                give_order(state, buffers, number, buffers.choice[np.argmax(buffers.scores[:count])])
                 considered += 1

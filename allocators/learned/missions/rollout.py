@@ -7,7 +7,7 @@ import numpy as np
 
 from alloc.allocators.learned.missions.feature_names import FEATURES
 from alloc.allocators.learned.missions.network_arrays import MissionWeights, Singles
-from alloc.allocators.learned.missions.play import Room, act, score_options, talk, wants
+from alloc.allocators.learned.missions.play import Buffers, choose_senders, give_order, score_options, should_decide
 from alloc.allocators.missions.advance import advance
 from alloc.allocators.missions.chance import first_key, fraction, keyed
 from alloc.allocators.missions.layout import IDLE, MESSAGES, MISSED, OVER, WORKING, MissionArrays
@@ -98,27 +98,27 @@ def missed_cost(state: MissionArrays, ideal: float) -> float:
 
 
 @compiled_in_place
-def sample(room: Room, count: int, key: int) -> tuple[int, float]:
+def sample(buffers: Buffers, count: int, key: int) -> tuple[int, float]:
     """Draw an option from the softmax of the scores; return it and its log-probability."""
     highest, chosen = -np.inf, 0
-    largest = room.scores[np.argmax(room.scores[:count])]
+    largest = buffers.scores[np.argmax(buffers.scores[:count])]
     total = 0.0
     for row in range(count):
-        total += math.exp(room.scores[row] - largest)
-        noisy = room.scores[row] - math.log(-math.log(fraction(keyed(key, row)) + 1e-300) + 1e-300)
+        total += math.exp(buffers.scores[row] - largest)
+        noisy = buffers.scores[row] - math.log(-math.log(fraction(keyed(key, row)) + 1e-300) + 1e-300)
         if noisy > highest:
             highest, chosen = noisy, row
-    return chosen, room.scores[chosen] - largest - math.log(total)
+    return chosen, buffers.scores[chosen] - largest - math.log(total)
 
 
 @compiled_in_place
-def rollout(state: MissionArrays, room: Room, weights: MissionWeights, seed: int, record: Record) -> None:
+def rollout(state: MissionArrays, buffers: Buffers, weights: MissionWeights, seed: int, record: Record) -> None:
     """Sample the decisions of all agents from the network until the end of a mission, and record them.
 
     Parameters
     ----------
     state : MissionArrays
-    room : Room
+    buffers : Buffers
     weights : MissionWeights
     seed : int
         Seed of the run and of the samples.
@@ -137,24 +137,24 @@ def rollout(state: MissionArrays, room: Room, weights: MissionWeights, seed: int
             record.total[0] += missed_cost(state, record.total[1])
             return
         if wanted == MESSAGES:
-            talk(state, room)
+            choose_senders(state, buffers)
             continue
         missed = missed_cost(state, record.total[1])
         for place in range(head.deciding):
             number = state.deciding[place]
             account(state, record, number)
-            if wants(state, room, number):
-                count = score_options(room, state.area, sensing, seed, number, number, weights)
-                option, log_probability = sample(room, count, keyed(key, drawn))
+            if should_decide(state, buffers, number):
+                count = score_options(buffers, state.area, sensing, seed, number, number, weights)
+                option, log_probability = sample(buffers, count, keyed(key, drawn))
                 drawn += 1
                 k = record.length[0]
                 if k < len(record.choices):
                     for row in range(count):
                         for feature in range(FEATURES):
-                            record.options[k, row, feature] = room.options[row, feature]
+                            record.options[k, row, feature] = buffers.options[row, feature]
                     record.choices[k], record.action[k], record.agent[k] = count, option, number
                     record.log_probability[k], record.hour[k] = log_probability, head.hour
                     record.cost[k] = record.total[0] + missed
                     record.length[0] += 1
-                act(state, room, number, room.choice[option])
+                give_order(state, buffers, number, buffers.choice[option])
             record.is_working[number] = state.agents[number].status == WORKING

@@ -14,7 +14,7 @@ MEMORY = 20
 """Number of radio periods after which reports on other agents are ignored."""
 
 
-class Coming(NamedTuple):
+class Expected(NamedTuple):
     """The agents that come to each task, as determined by `expect`.
 
     Attributes
@@ -66,7 +66,7 @@ class Situation(NamedTuple):
         Whether the entry is another agent with a recent report.
     others : ndarray of int, shape (1,)
         Number of entries of other agents in use; further ones are ignored.
-    coming : Coming
+    expected : Expected
         Workspace for derived figures.
     """
 
@@ -77,7 +77,7 @@ class Situation(NamedTuple):
     target: IntArray
     counts: BoolArray
     others: IntArray
-    coming: Coming
+    expected: Expected
 
 
 HOUR, X, Y, Z, ABILITY, SPEED, BATTERY, ENERGY_PER_DISTANCE, SPAN = range(9)
@@ -106,7 +106,7 @@ def empty(n: int, m: int) -> Situation:
         target=np.full(n, NOBODY),
         counts=np.zeros(n, np.bool_),
         others=np.full(1, n, np.intp),
-        coming=Coming(
+        expected=Expected(
             first=np.full(m, NOBODY),
             following=np.full(n, NOBODY),
             others=np.zeros(m, np.intp),

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from alloc.allocators.learned.missions import situation as known
-from alloc.allocators.learned.missions.play import Room
+from alloc.allocators.learned.missions.play import Buffers
 from alloc.allocators.learned.missions.situation import fill_own, fill_tasks
 from alloc.allocators.missions.layout import IDLE, NOBODY, WORKING, MissionArrays
 from alloc.allocators.missions.reports import NOTHING
@@ -15,7 +15,9 @@ from alloc.problems.fields import FloatArray, IntArray
 
 
 @compiled_in_place
-def bid(state: MissionArrays, number: int, room: Room, parameters: FloatArray, notes: Notes, rank: IntArray) -> int:
+def bid(
+    state: MissionArrays, number: int, buffers: Buffers, parameters: FloatArray, notes: Notes, rank: IntArray
+) -> int:
     """Return the task for which an agent bids, -1 for none.
 
     Parameters
@@ -23,7 +25,7 @@ def bid(state: MissionArrays, number: int, room: Room, parameters: FloatArray, n
     state : MissionArrays
     number : int
         Index of the agent.
-    room : Room
+    buffers : Buffers
     parameters : ndarray
         In the order of `AuctionPolicyParameters`.
     notes : Notes
@@ -31,7 +33,7 @@ def bid(state: MissionArrays, number: int, room: Room, parameters: FloatArray, n
         Rank of each agent's id in alphabetical order.
     """
     memory, stay, seats_factor, flight, age = parameters
-    situation, bids, n = room.situation, notes.own[number], len(notes.own)
+    situation, bids, n = buffers.situation, notes.own[number], len(notes.own)
     fill_own(state, number, situation.own)
     fill_tasks(state, number, situation.task, situation.can)
     take_newer(bids, notes.heard[number])

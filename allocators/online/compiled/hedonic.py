@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from alloc.allocators.learned.missions.play import Room
+from alloc.allocators.learned.missions.play import Buffers
 from alloc.allocators.missions.chance import first_key, fraction, keyed
 from alloc.allocators.missions.layout import NOBODY, MissionArrays
 from alloc.allocators.online.compiled.notes import Notes, copy, precedes
@@ -14,7 +14,13 @@ from alloc.problems.fields import FloatArray, IntArray
 
 @compiled_in_place
 def join(
-    state: MissionArrays, number: int, room: Room, parameters: FloatArray, notes: Notes, seed: int, moves: IntArray
+    state: MissionArrays,
+    number: int,
+    buffers: Buffers,
+    parameters: FloatArray,
+    notes: Notes,
+    seed: int,
+    moves: IntArray,
 ) -> int:
     """Return the task of the coalition that an agent joins, -1 for none; `moves` counts its changes."""
     partition, heard, n = notes.own[number], notes.heard[number], len(notes.own)
@@ -26,9 +32,9 @@ def join(
         task = int(partition[i])
         if task != NOBODY and state.task_hour[row, task] >= 0 and state.task_left[row, task] < 0:
             partition[i] = NOBODY
-    fill_with(state, number, room.situation, parameters[1], partition[:n])
+    fill_with(state, number, buffers.situation, parameters[1], partition[:n])
     home = int(partition[number])
-    choice = best_task(room, home, parameters)
+    choice = best_task(buffers, home, parameters)
     if choice != home:
         partition[number] = choice
         partition[n] += 1

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from alloc.allocators.learned.missions import situation as known
-from alloc.allocators.learned.missions.play import Room, is_busy, room_for
+from alloc.allocators.learned.missions.play import Buffers, is_busy, new_buffers
 from alloc.allocators.learned.missions.situation import fill_own, fill_tasks
 from alloc.allocators.missions.advance import advance
 from alloc.allocators.missions.chance import first_key, keyed
@@ -39,35 +39,47 @@ class Memory(NamedTuple):
 
 
 @compiled_in_place
-def nearest(state: MissionArrays, number: int, room: Room) -> int:
+def nearest(state: MissionArrays, number: int, buffers: Buffers) -> int:
     """Return the nearest task, -1 for none."""
-    fill_own(state, number, room.situation.own)
-    fill_tasks(state, number, room.situation.task, room.situation.can)
+    fill_own(state, number, buffers.situation.own)
+    fill_tasks(state, number, buffers.situation.task, buffers.situation.can)
     best, least = NOBODY, np.inf
-    for j in range(len(room.situation.can)):
-        if room.situation.can[j] and room.situation.task[known.DISTANCE, j] < least:
-            best, least = j, room.situation.task[known.DISTANCE, j]
+    for j in range(len(buffers.situation.can)):
+        if buffers.situation.can[j] and buffers.situation.task[known.DISTANCE, j] < least:
+            best, least = j, buffers.situation.task[known.DISTANCE, j]
     return best
 
 
 @compiled_in_place
 def choose(
-    state: MissionArrays, number: int, room: Room, policy_code: int, parameters: FloatArray, memory: Memory, seed: int
+    state: MissionArrays,
+    number: int,
+    buffers: Buffers,
+    policy_code: int,
+    parameters: FloatArray,
+    memory: Memory,
+    seed: int,
 ) -> int:
     """Return the task that an agent is to go to, -1 for none."""
     if policy_code == GREEDY:
-        fill_with(state, number, room.situation, parameters[1], memory.none)
-        return best_task(room, int(room.situation.own[known.TARGET]), parameters)
+        fill_with(state, number, buffers.situation, parameters[1], memory.none)
+        return best_task(buffers, int(buffers.situation.own[known.TARGET]), parameters)
     if policy_code == HEDONIC:
-        return join(state, number, room, parameters, memory.notes, seed, memory.moves)
+        return join(state, number, buffers, parameters, memory.notes, seed, memory.moves)
     if policy_code == AUCTION:
-        return bid(state, number, room, parameters, memory.notes, memory.rank)
-    return nearest(state, number, room)
+        return bid(state, number, buffers, parameters, memory.notes, memory.rank)
+    return nearest(state, number, buffers)
 
 
 @compiled_in_place
 def run_to_end(
-    state: MissionArrays, room: Room, policy_code: int, kind: int, parameters: FloatArray, memory: Memory, seed: int
+    state: MissionArrays,
+    buffers: Buffers,
+    policy_code: int,
+    kind: int,
+    parameters: FloatArray,
+    memory: Memory,
+    seed: int,
 ) -> None:
     """Run a mission to its end under a policy; `kind` is that of its notes, 0 for none."""
     head, key = state.head[0], keyed(first_key(EXPLORING), seed)
@@ -85,7 +97,7 @@ def run_to_end(
             number = state.deciding[place]
             if policy_code == NEAREST and state.agents[number].order == TO_TASK and is_busy(state, number):
                 continue
-            task = choose(state, number, room, policy_code, parameters, memory, seed)
+            task = choose(state, number, buffers, policy_code, parameters, memory, seed)
             if task >= 0:
                 order(state, number, TO_TASK, task, (0.0, 0.0, 0.0))
             else:
@@ -112,5 +124,5 @@ def final_state(arrays: MissionArrays, policy: str, parameters: FloatArray, seed
     n, m, slots = len(state.agents), len(state.tasks), len(state.sent)
     none = np.zeros(n, np.intp)
     memory = Memory(notes_for(NOTES[policy_code], n, slots), none, none.copy(), rank, np.zeros(0))
-    run_to_end(state, room_for(n, m), policy_code, NOTES[policy_code], parameters, memory, seed)
+    run_to_end(state, new_buffers(n, m), policy_code, NOTES[policy_code], parameters, memory, seed)
     return state

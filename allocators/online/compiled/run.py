@@ -6,7 +6,7 @@ import math
 import numpy as np
 
 from alloc.allocators.learned.missions.network import compiled_weights
-from alloc.allocators.learned.missions.play import play, room_for
+from alloc.allocators.learned.missions.play import new_buffers, play
 from alloc.allocators.learned.missions.situation import MEMORY
 from alloc.allocators.missions.pack import begun, measure, pack
 from alloc.allocators.online.compiled.policies import NAMES, final_state
@@ -41,8 +41,8 @@ def run_compiled(mission: Mission, policy: Policy, seed: int = 0) -> MissionResu
     arrays = pack(mission, memory=memory_of(policy, mission))
     if isinstance(policy, NetworkPolicy):
         state = begun(arrays, seed)
-        room = room_for(mission.instance.n, mission.instance.m, policy.parameters.periods)
-        play(state, room, compiled_weights(policy.network), seed)
+        buffers = new_buffers(mission.instance.n, mission.instance.m, policy.parameters.periods)
+        play(state, buffers, compiled_weights(policy.network), seed)
     elif name in NAMES:
         state = final_state(arrays, name, parameters_of(policy), seed, rank_of(mission.instance.agent_ids))
     else:

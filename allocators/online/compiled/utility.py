@@ -3,8 +3,8 @@
 import math
 
 from alloc.allocators.learned.missions import situation as known
-from alloc.allocators.learned.missions.options import done_with, expect
-from alloc.allocators.learned.missions.play import Room
+from alloc.allocators.learned.missions.options import completion_with, expect
+from alloc.allocators.learned.missions.play import Buffers
 from alloc.allocators.learned.missions.situation import Situation, does_count, fill_others, fill_own, fill_tasks
 from alloc.allocators.missions.layout import NOBODY, MissionArrays
 from alloc.allocators.missions.motion import distance_between
@@ -51,21 +51,21 @@ def redirect(state: MissionArrays, number: int, situation: Situation, memory: fl
 
 
 @compiled_in_place
-def best_task(room: Room, home: int, parameters: FloatArray) -> int:
-    """Return the task of highest utility in the situation of `room`, -1 for none.
+def best_task(buffers: Buffers, home: int, parameters: FloatArray) -> int:
+    """Return the task of highest utility in the situation of `buffers`, -1 for none.
 
     Parameters
     ----------
-    room : Room
+    buffers : Buffers
     home : int
         The agent's present task, -1 for none.
     parameters : ndarray
         In the order of `UtilityParameters`.
     """
     stay, _, missed, crowding, flight, age = parameters
-    situation = room.situation
+    situation = buffers.situation
     expect(situation)
-    others, without = situation.coming.others, situation.coming.without
+    others, without = situation.expected.others, situation.expected.without
     own, task, best, highest = situation.own, situation.task, NOBODY, 0.0
     hour = own[known.HOUR]
     for j in range(len(situation.can)):
@@ -76,7 +76,7 @@ def best_task(room: Room, home: int, parameters: FloatArray) -> int:
         left, since = task[known.LEFT, j], task[known.KNOWN_AT, j]
         if others[j] == 0 and not is_there:
             left += task[known.GROWTH, j] * (arrival - since)
-        with_me = done_with(situation, j, arrival, left)
+        with_me = completion_with(situation, j, arrival, left)
         if with_me >= without[j]:
             continue
         hours = with_me - hour

@@ -8,24 +8,24 @@ from typing import ClassVar
 import numpy as np
 
 from alloc.allocators.contract.parameters import CheckedParameters, bounded
-from alloc.allocators.learned.missions.exploring import centre, notice
+from alloc.allocators.learned.missions.exploring import centre, record_seen
+from alloc.allocators.learned.missions.messages import should_send
 from alloc.allocators.learned.missions.network import compiled_weights
 from alloc.allocators.learned.missions.network_arrays import MissionWeights
 from alloc.allocators.learned.missions.options import WAIT
-from alloc.allocators.learned.missions.play import Room, consider, is_due, note_choice, room_for
+from alloc.allocators.learned.missions.play import Buffers, is_due, new_buffers, record_change, score_options_compiled
 from alloc.allocators.learned.missions.policy_file import SHIPPED, SHIPPED_PPO, load_network
 from alloc.allocators.learned.missions.situation import MEMORY, OTHER_WAYS, Situation
-from alloc.allocators.learned.missions.talking import is_to_send
 from alloc.allocators.missions.layout import NOBODY
 from alloc.allocators.missions.motion import distance_between
 from alloc.allocators.online.contract import AgentDecider, Briefing, Policy, PolicyInfo, TurnsDecider
-from alloc.allocators.online.policies.network_turns import NetworkTurns, ways_of
+from alloc.allocators.online.policies.network_turns import NetworkTurns, metric_code
 from alloc.problems.missions.simulation.reports import AgentReport, Message, TaskReport, View
 from alloc.problems.missions.simulation.state import ACTIVE, STAY, AgentStatus, Order, TaskStatus
 from alloc.problems.vocabulary import MANHATTAN, Knowledge
 
 REMEMBERED = ("seen", "goal", "decided", "tasks", "periods", "saved", "counted", "news")
-"""Fields of `Room` that persist between decisions; the others are scratch."""
+"""Fields of `Buffers` that persist between decisions; the others are scratch."""
 
 NOWHERE = (math.nan, math.nan, math.nan)
 
@@ -111,56 +111,60 @@ class _NetworkDecider(AgentDecider):
         is_blind = briefing.knowledge is Knowledge.LOCAL
         self._sensing = briefing.sensing if is_blind else math.inf
         self._seed, self._number = briefing.seed[0], briefing.seed[1] - 1
-        self._room = room_for(1, 0, periods)
+        self._buffers = new_buffers(1, 0, periods)
 
     def decide(self, view: View) -> Order | None:
-        room, own = self._room, view.own
+        buffers, own = self._buffers, view.own
         tasks = [task for task in view.tasks.values() if task.status is TaskStatus.OPEN]
         names = [task.facts.id for task in tasks]
         is_flying = own.status is AgentStatus.FLYING
         is_busy = own.task in names if own.task is not None else is_flying
-        is_considered = is_due(room, 0, view.hour, self._period, len(tasks), is_busy)
+        is_considered = is_due(buffers, 0, view.hour, self._period, len(tasks), is_busy)
         if (is_considered or is_flying) and self._sensing < math.inf:
             x, y, _ = own.place.position or NOWHERE
-            notice(self._area, self._sensing, x, y, view.hour, room.seen[0])
+            record_seen(self._area, self._sensing, x, y, view.hour, buffers.seen[0])
         if not is_considered:
             return None
-        room.decided[0], room.tasks[0] = view.hour, len(tasks)
-        room = self._with_room(len(view.agents), len(tasks) + 1)
-        _fill(view, room.situation, tasks, self._span, MEMORY * self._period)
-        count = consider(room, self._area, self._sensing, self._seed, self._number, 0, self._weights)
-        choice = int(room.choice[np.argmax(room.scores[:count])])
-        note_choice(room, 0, choice)
+        buffers.decided[0], buffers.tasks[0] = view.hour, len(tasks)
+        buffers = self._resized(len(view.agents), len(tasks) + 1)
+        _fill(view, buffers.situation, tasks, self._span, MEMORY * self._period)
+        count = score_options_compiled(buffers, self._area, self._sensing, self._seed, self._number, 0, self._weights)
+        choice = int(buffers.choice[np.argmax(buffers.scores[:count])])
+        record_change(buffers, 0, choice)
         if choice >= 0:
             return Order(names[choice])
         if choice == WAIT:
             return STAY
         if is_flying and own.task is None:
             return None
-        x, y, z = centre(self._area, int(room.goal[0]))
+        x, y, z = centre(self._area, int(buffers.goal[0]))
         return Order(position=(float(x), float(y), float(z)))
 
     def message(self, view: View) -> Message | None:
-        room, tick = self._room, round(view.hour / self._period)
-        return view.message() if is_to_send(room.periods, room.saved, room.counted, room.news, 0, tick) else None
+        buffers, tick = self._buffers, round(view.hour / self._period)
+        return (
+            view.message()
+            if should_send(buffers.periods, buffers.saved, buffers.counted, buffers.news, 0, tick)
+            else None
+        )
 
-    def _with_room(self, n: int, m: int) -> Room:
+    def _resized(self, n: int, m: int) -> Buffers:
         """Return arrays for `n` agents and `m` tasks, with what the agent remembers copied over."""
-        fresh = room_for(n, m)
-        kept = {name: getattr(self._room, name) for name in REMEMBERED}
-        self._room = fresh._replace(**kept)
-        return self._room
+        fresh = new_buffers(n, m)
+        kept = {name: getattr(self._buffers, name) for name in REMEMBERED}
+        self._buffers = fresh._replace(**kept)
+        return self._buffers
 
 
 def _compile_loops(weights: MissionWeights) -> None:
     """Compile all loops that a decision needs, so that the first one also meets its deadline."""
-    room, area = room_for(1, 2), np.array([[0.0, 0.0, 0.0], [1.0, 1.0, 1.0]])
-    room.situation.own[:] = 1.0
-    is_due(room, 0, 0.0, 1.0, 1, False)
-    notice(area, 1.0, 0.0, 0.0, 0.0, room.seen[0])
-    consider(room, area, 1.0, 0, 0, 0, weights)
-    note_choice(room, 0, WAIT)
-    is_to_send(room.periods, room.saved, room.counted, room.news, 0, 1)
+    buffers, area = new_buffers(1, 2), np.array([[0.0, 0.0, 0.0], [1.0, 1.0, 1.0]])
+    buffers.situation.own[:] = 1.0
+    is_due(buffers, 0, 0.0, 1.0, 1, False)
+    record_seen(area, 1.0, 0.0, 0.0, 0.0, buffers.seen[0])
+    score_options_compiled(buffers, area, 1.0, 0, 0, 0, weights)
+    record_change(buffers, 0, WAIT)
+    should_send(buffers.periods, buffers.saved, buffers.counted, buffers.news, 0, 1)
     distance_between(False, centre(area, 0), NOWHERE)
 
 
@@ -182,7 +186,7 @@ def _fill(view: View, situation: Situation, tasks: list[TaskReport], span: float
         NOBODY if own.task is None else index.get(own.task, len(tasks)),
         is_at_work,
         is_flying,
-        ways_of(view),
+        metric_code(view),
     )
     for j, task in enumerate(tasks):
         known = task.facts
@@ -203,7 +207,7 @@ def _fill(view: View, situation: Situation, tasks: list[TaskReport], span: float
 def _distance(view: View, task: TaskReport) -> float:
     """Return the distance to a task, rounded as in the compiled simulation so that ties are the same."""
     here, there = view.own.place.position, task.facts.place.position
-    if here is None or there is None or ways_of(view) == OTHER_WAYS:
+    if here is None or there is None or metric_code(view) == OTHER_WAYS:
         return view.distance(view.own, task)
     return distance_between(view.metric == MANHATTAN, here, there)
 

@@ -8,7 +8,13 @@ import numpy as np
 from alloc.allocators.learned.missions import situation as known
 from alloc.allocators.learned.missions.network_arrays import MissionWeights
 from alloc.allocators.learned.missions.options import WAIT
-from alloc.allocators.learned.missions.together import NOT_DUE, Together, decide_together, meet, together_for
+from alloc.allocators.learned.missions.turns import (
+    NOT_DUE,
+    JointDecisions,
+    decide_in_turn,
+    fill_shared_parts,
+    new_joint_decisions,
+)
 from alloc.allocators.missions.layout import NOBODY
 from alloc.allocators.online.contract import Briefing, TurnsDecider
 from alloc.problems.distances.reach import TOLERANCE
@@ -35,7 +41,7 @@ class NetworkTurns(TurnsDecider):
     def __init__(self, briefing: Briefing, weights: MissionWeights) -> None:
         self._weights, self._period, self._span = weights, briefing.radio.period, math.dist(*briefing.area)
         self._names: list[str] = []
-        self._together = together_for(0, 1)
+        self._joint = new_joint_decisions(0, 1)
         _compile_loops(weights)
 
     def turns(self, view: View, names: Sequence[str]) -> Iterator[tuple[str, Order | None]]:
@@ -44,14 +50,14 @@ class NetworkTurns(TurnsDecider):
             return
         tasks = [task for task in view.tasks.values() if task.status is TaskStatus.OPEN]
         orders = {**{j: Order(task.facts.id) for j, task in enumerate(tasks)}, WAIT: STAY, NOT_DUE: None}
-        together = self._met(view, tasks)
+        joint = self._with_shared_parts(view, tasks)
         row = {name: i for i, name in enumerate(self._names)}
-        remembered = together.room.decided, together.room.tasks
+        remembered = joint.buffers.decided, joint.buffers.tasks
         for first in range(0, len(names), AT_ONCE):
             some = names[first : first + AT_ONCE]
             rows = np.array([row[name] for name in some])
             choices, before = rows.copy(), [part[rows] for part in remembered]
-            decide_together(together, self._weights, choices, self._period, len(tasks))
+            decide_in_turn(joint, self._weights, choices, self._period, len(tasks))
             for place, (name, choice) in enumerate(zip(some, choices.tolist(), strict=True), 1):
                 try:
                     yield name, orders[choice]
@@ -60,46 +66,46 @@ class NetworkTurns(TurnsDecider):
                         part[rows[place:]] = then[place:]
                     raise
 
-    def _met(self, view: View, tasks: list[TaskReport]) -> Together:
+    def _with_shared_parts(self, view: View, tasks: list[TaskReport]) -> JointDecisions:
         """Fill in and return what all agents know, with the hour of each one's last decision."""
         agents = list(view.agents.values())
-        self._make_room(list(view.agents), len(tasks) + 1)
-        together, places = self._together, [agent.place for agent in agents]
+        self._resize(list(view.agents), len(tasks) + 1)
+        joint, places = self._joint, [agent.place for agent in agents]
         index = {task.facts.id: j for j, task in enumerate(tasks)}
-        together.own[:] = [_own(view, agent, self._span, index) for agent in agents]
+        joint.own[:] = [_own(view, agent, self._span, index) for agent in agents]
         if tasks:
             ways = view.distances(places, tasks)
-            together.ways[:, :-1] = ways
-            together.can[:, :-1] = _reach(view, agents, tasks, ways)
-            together.room.situation.task[: known.DISTANCE, :-1] = np.array([_facts(task) for task in tasks]).T
-        rows, target = np.arange(len(agents)), together.own[:, known.TARGET].astype(np.intp)
+            joint.distances[:, :-1] = ways
+            joint.can[:, :-1] = _reach(view, agents, tasks, ways)
+            joint.buffers.situation.task[: known.DISTANCE, :-1] = np.array([_facts(task) for task in tasks]).T
+        rows, target = np.arange(len(agents)), joint.own[:, known.TARGET].astype(np.intp)
         has_open = (target >= 0) & (target < len(tasks))
-        together.can[rows[has_open], target[has_open]] = True
-        meet(together)
-        return together
+        joint.can[rows[has_open], target[has_open]] = True
+        fill_shared_parts(joint)
+        return joint
 
-    def _make_room(self, names: list[str], m: int) -> None:
+    def _resize(self, names: list[str], m: int) -> None:
         """Allocate arrays for these agents and `m` tasks; keep what agents remember."""
-        before, rows = self._together, {name: i for i, name in enumerate(self._names)}
+        before, rows = self._joint, {name: i for i, name in enumerate(self._names)}
         if names == self._names and m == before.can.shape[1]:
             return
-        self._names, self._together = names, together_for(len(names), m)
+        self._names, self._joint = names, new_joint_decisions(len(names), m)
         kept = [(i, rows[name]) for i, name in enumerate(names) if name in rows]
         if kept:
             now, then = np.array(kept).T
-            self._together.room.decided[now] = before.room.decided[then]
-            self._together.room.tasks[now] = before.room.tasks[then]
+            self._joint.buffers.decided[now] = before.buffers.decided[then]
+            self._joint.buffers.tasks[now] = before.buffers.tasks[then]
 
 
 def _compile_loops(weights: MissionWeights) -> None:
     """Compile all loops, so that the first decision also meets its deadline."""
-    together = together_for(1, 2)
-    together.own[:] = 1.0
-    meet(together)
-    decide_together(together, weights, np.zeros(1, np.intp), 1.0, 0)
+    joint = new_joint_decisions(1, 2)
+    joint.own[:] = 1.0
+    fill_shared_parts(joint)
+    decide_in_turn(joint, weights, np.zeros(1, np.intp), 1.0, 0)
 
 
-def ways_of(view: View) -> int:
+def metric_code(view: View) -> int:
     """Return the code of the metric; see `alloc.allocators.learned.missions.situation`."""
     if view.has_table or view.metric == GEOGRAPHIC:
         return known.OTHER_WAYS
@@ -120,7 +126,7 @@ def _own(view: View, agent: AgentReport, span: float, index: dict[str, int]) -> 
         NOBODY if agent.task is None else index.get(agent.task, len(index)),
         agent.status is AgentStatus.WORKING,
         agent.status is AgentStatus.FLYING,
-        ways_of(view),
+        metric_code(view),
     )
 
 

@@ -32,7 +32,7 @@ class PackedMission(NamedTuple):
     ideal : float
         Ideal mission time: hours that all agents together would need for all work if flights took no time.
     periods : int
-        Number of radio periods per message, see `is_to_send`.
+        Number of radio periods per message, see `should_send`.
     """
 
     arrays: MissionArrays

@@ -22,7 +22,7 @@ from alloc.allocators.learned.algorithms.hyperparameters import PpoParameters
 from alloc.allocators.learned.algorithms.ppo import adapted_learning_rate, clipped_surrogate
 from alloc.allocators.learned.algorithms.schedules import linear, set_learning_rate
 from alloc.allocators.learned.missions.network import compiled_weights, first_network
-from alloc.allocators.learned.missions.play import room_for
+from alloc.allocators.learned.missions.play import new_buffers
 from alloc.allocators.learned.missions.rollout import Record, record_for, rollout
 from alloc.allocators.learned.missions.training.curriculum import MissionCurriculum, PackedMission
 from alloc.allocators.learned.network.state_dict import StateDict
@@ -108,8 +108,8 @@ class MissionPpo:
         weights, records = compiled_weights(self.network), []
         for play in range(PLAYS):
             record = record_for(n, m, MOST_DECISIONS, mission.ideal)
-            room = room_for(n, m, mission.periods)
-            rollout(begun(mission.arrays, seed), room, weights, PLAYS * seed + play, record)
+            buffers = new_buffers(n, m, mission.periods)
+            rollout(begun(mission.arrays, seed), buffers, weights, PLAYS * seed + play, record)
             records.append(record)
         return records
 

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from alloc.allocators.learned.missions.network import MissionNetwork, compiled_weights
-from alloc.allocators.learned.missions.play import play, room_for
+from alloc.allocators.learned.missions.play import new_buffers, play
 from alloc.allocators.learned.missions.training.curriculum import PackedMission
 from alloc.allocators.learned.training.validation import Validation
 from alloc.allocators.missions.layout import DONE, MissionArrays
@@ -34,7 +34,7 @@ def validate(network: MissionNetwork, missions: list[tuple[PackedMission, int]])
     weights, rows = compiled_weights(network), []
     for mission, seed in missions:
         state = begun(mission.arrays, seed)
-        play(state, room_for(len(state.agents), len(state.tasks), mission.periods), weights, seed)
+        play(state, new_buffers(len(state.agents), len(state.tasks), mission.periods), weights, seed)
         rows.append(figures(state, mission.ideal))
     time, unserved, _, distance = np.mean(rows, axis=0).tolist()
     cost = cost_of(rows)

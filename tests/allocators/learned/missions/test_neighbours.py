@@ -9,9 +9,9 @@ from alloc.allocators.learned.missions import feature_names as names
 from alloc.allocators.learned.missions import situation as known
 from alloc.allocators.learned.missions.network import first_network
 from alloc.allocators.learned.missions.options import fill_options
-from alloc.allocators.learned.missions.play import room_for
+from alloc.allocators.learned.missions.play import new_buffers
 from alloc.allocators.learned.missions.policy_file import save_network
-from alloc.allocators.learned.missions.together import meet, nearer, together_for
+from alloc.allocators.learned.missions.turns import fill_shared_parts, nearer, new_joint_decisions
 from alloc.allocators.missions.advance import advance
 from alloc.allocators.missions.layout import ORDERS
 from alloc.allocators.missions.pack import begun, pack
@@ -57,19 +57,19 @@ def test_nearer_agents_are_determined_by_the_metric(metric: str, rivals: int) ->
     instance = Instance(
         ability=[1, 1], workload=[9], agent_position=PLACES, task_position=[[1.0, 0.0]], speed=[1, 1], metric=metric
     )
-    state, room = begun(pack(Mission(instance, knowledge="full"))), room_for(2, 1)
+    state, buffers = begun(pack(Mission(instance, knowledge="full"))), new_buffers(2, 1)
     assert advance(state) == ORDERS
-    known.fill(state, 0, room.situation)
-    fill_options(room.situation, room.look, room.options, room.choice)
-    assert room.options[0, names.RIVALS] == np.float32(1 - 1 / (1 + rivals / 3))
+    known.fill(state, 0, buffers.situation)
+    fill_options(buffers.situation, buffers.look, buffers.options, buffers.choice)
+    assert buffers.options[0, names.RIVALS] == np.float32(1 - 1 / (1 + rivals / 3))
 
 
 @pytest.mark.parametrize(("ways", "rivals"), [(known.EUCLIDEAN_WAYS, 1), (known.MANHATTAN_WAYS, 0)])
 def test_nearer_agents_are_determined_by_the_metric_for_agents_in_turn(ways: int, rivals: int) -> None:
     """The same holds for agents that decide in turn."""
-    together = together_for(2, 1)
-    together.own[:, [known.X, known.Y]] = PLACES
-    together.own[:, known.TARGET], together.own[:, known.METRIC], together.ways[0, 0] = -1, ways, 1.0
-    together.room.situation.task[known.TASK_X, 0] = 1.0
-    meet(together)
-    assert nearer(together, 0, 0) == rivals
+    joint = new_joint_decisions(2, 1)
+    joint.own[:, [known.X, known.Y]] = PLACES
+    joint.own[:, known.TARGET], joint.own[:, known.METRIC], joint.distances[0, 0] = -1, ways, 1.0
+    joint.buffers.situation.task[known.TASK_X, 0] = 1.0
+    fill_shared_parts(joint)
+    assert nearer(joint, 0, 0) == rivals

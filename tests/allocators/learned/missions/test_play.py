@@ -8,10 +8,10 @@ import torch
 
 from alloc.allocators.learned.missions.feature_names import FEATURES
 from alloc.allocators.learned.missions.forward import score
+from alloc.allocators.learned.missions.messages import should_send
 from alloc.allocators.learned.missions.network import compiled_weights, first_network
-from alloc.allocators.learned.missions.play import play, room_for
+from alloc.allocators.learned.missions.play import new_buffers, play
 from alloc.allocators.learned.missions.policy_file import load_network, save_network
-from alloc.allocators.learned.missions.talking import is_to_send
 from alloc.allocators.missions.pack import begun, measure, pack
 from alloc.allocators.online.policies.gappo import NetworkPolicy
 from alloc.allocators.online.run import simulate
@@ -24,10 +24,17 @@ pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]  # loops are compiled 
 
 def scored(options: np.ndarray, seed: int) -> np.ndarray:
     """Return the scores that the compiled network gives."""
-    room = room_for(0, len(options))
-    room.options[: len(options), :FEATURES] = options
-    score(room.options, len(options), compiled_weights(first_network(seed)), room.token, room.pooled, room.scores)
-    return room.scores[: len(options)]
+    buffers = new_buffers(0, len(options))
+    buffers.options[: len(options), :FEATURES] = options
+    score(
+        buffers.options,
+        len(options),
+        compiled_weights(first_network(seed)),
+        buffers.token,
+        buffers.pooled,
+        buffers.scores,
+    )
+    return buffers.scores[: len(options)]
 
 
 def test_compiled_scores_match_torch() -> None:
@@ -68,7 +75,7 @@ def test_policy_gives_the_same_measures_in_both_simulations(
     mission = random_mission(MissionParameters(family, *size, knowledge=knowledge), 4)
     expected = simulate(mission, NetworkPolicy(policy=tmp_path / "policy.safetensors", periods=3), seed=5).result
     state = begun(pack(mission), 5)
-    play(state, room_for(*size, 3), compiled_weights(network), 5)
+    play(state, new_buffers(*size, 3), compiled_weights(network), 5)
     found = measure(mission, state, "gappo", 5)
     for name in ("mission_time", "tasks_done", "tasks_missed", "energy", "distance", "switches", "messages", "bytes"):
         value = getattr(expected, name)
@@ -78,11 +85,11 @@ def test_policy_gives_the_same_measures_in_both_simulations(
 def test_message_rate_depends_on_news() -> None:
     """After the first two, one message per ten periods; news is sent as soon as possible, with one message reserved."""
     counted, news = np.zeros(1, np.intp), np.zeros(1, np.intp)
-    saved = room_for(1, 1, 10).saved  # of three messages
+    saved = new_buffers(1, 1, 10).saved  # of three messages
     sent = []
     for tick in range(100):
         news[0] |= 15 <= tick < 60
-        if is_to_send(10, saved, counted, news, 0, tick):
+        if should_send(10, saved, counted, news, 0, tick):
             sent.append(tick)
     assert sent == [0, 1, 10, 15, 20, 30, 40, 50, 60, 80, 90]
 

@@ -63,7 +63,7 @@ def test_orders_match_separate_decisions(seed, monkeypatch):
     In separate decisions, an agent guesses the choices of free neighbours, which is not needed in turns.
     """
     for module in (gappo, network_turns):
-        monkeypatch.setattr(module, "ways_of", lambda view: OTHER_WAYS)
+        monkeypatch.setattr(module, "metric_code", lambda view: OTHER_WAYS)
     rng = np.random.default_rng(seed)
     mission = crowd(rng) if seed % 2 else random_mission_of_any_kind(rng)
     with MissionPlanner(mission, "gappo", None) as fast, MissionPlanner(mission, OneByOne(), None) as slow:

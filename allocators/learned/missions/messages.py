@@ -8,7 +8,7 @@ MOST_SAVED = 3
 
 
 @compiled_in_place
-def is_to_send(periods: int, saved: IntArray, counted: IntArray, news: IntArray, row: int, tick: int) -> bool:
+def should_send(periods: int, saved: IntArray, counted: IntArray, news: IntArray, row: int, tick: int) -> bool:
     """Return whether an agent sends a message now, and update its state.
 
     Parameters

@@ -10,16 +10,16 @@ from alloc.allocators.learned.missions.forward import score
 from alloc.allocators.learned.missions.network_arrays import MissionWeights, Singles
 from alloc.allocators.learned.missions.options import (
     WAIT,
-    done_without,
+    completion_without,
     expect,
     fill_crowding,
     fill_shared,
     fill_task,
-    queue,
+    insert_arrival,
     squashed_count,
     time_scale,
 )
-from alloc.allocators.learned.missions.play import Room, is_due, room_for
+from alloc.allocators.learned.missions.play import Buffers, is_due, new_buffers
 from alloc.allocators.learned.missions.situation import Situation
 from alloc.allocators.missions.layout import NOBODY
 from alloc.allocators.runtime.compiled import compiled_in_place, inlined
@@ -29,18 +29,18 @@ NOT_DUE = -3
 """Choice of an agent that does not consider its options, and keeps its last order."""
 
 
-class Together(NamedTuple):
+class JointDecisions(NamedTuple):
     """The common knowledge of all agents, and that of each of itself.
 
     Attributes
     ----------
-    room : Room
+    buffers : Buffers
         Workspace, whose situation is that of the agent whose turn it is; all others count.
     own : ndarray, shape (n, OWN)
-    ways : ndarray, shape (n, m)
+    distances : ndarray, shape (n, m)
         Distance of each agent from each task.
     can : ndarray of bool, shape (n, m)
-    gaps : ndarray, shape (m, n)
+    idle_distances : ndarray, shape (m, n)
         Distances of each task from the agents without a task, in the first columns; Euclidean ones are squared.
     idle : ndarray of int, shape (n + 1,)
         These agents by column; the last entry is their number.
@@ -54,11 +54,11 @@ class Together(NamedTuple):
         Sum of the abilities of all agents.
     """
 
-    room: Room
+    buffers: Buffers
     own: FloatArray
-    ways: FloatArray
+    distances: FloatArray
     can: BoolArray
-    gaps: FloatArray
+    idle_distances: FloatArray
     idle: IntArray
     column: IntArray
     crowding: Singles
@@ -66,81 +66,81 @@ class Together(NamedTuple):
     abilities: FloatArray
 
 
-def together_for(n: int, m: int) -> Together:
+def new_joint_decisions(n: int, m: int) -> JointDecisions:
     """Return a workspace for n agents and m tasks."""
-    room = room_for(n, m)
-    return Together(
-        room=room,
+    buffers = new_buffers(n, m)
+    return JointDecisions(
+        buffers=buffers,
         own=np.zeros((n, known.OWN)),
-        ways=np.zeros((n, m)),
+        distances=np.zeros((n, m)),
         can=np.zeros((n, m), np.bool_),
-        gaps=np.zeros((m, n)),
+        idle_distances=np.zeros((m, n)),
         idle=np.zeros(n + 1, np.intp),
         column=np.zeros(n, np.intp),
-        crowding=np.zeros_like(room.options[:m]),
+        crowding=np.zeros_like(buffers.options[:m]),
         crowded=np.zeros(m, np.bool_),
         abilities=np.zeros(1),
     )
 
 
 @compiled_in_place
-def meet(together: Together) -> None:
-    """Compute the shared parts from `own`, `ways`, `can` and the tasks of the situation."""
-    situation, own = together.room.situation, together.own
+def fill_shared_parts(joint: JointDecisions) -> None:
+    """Compute the shared parts from `own`, `distances`, `can` and the tasks of the situation."""
+    situation, own = joint.buffers.situation, joint.own
     other = situation.other
-    together.crowded[:] = False
-    together.abilities[0], together.idle[-1], together.column[:] = 0.0, 0, -1
+    joint.crowded[:] = False
+    joint.abilities[0], joint.idle[-1], joint.column[:] = 0.0, 0, -1
     for i in range(len(own)):
         target = int(own[i, known.TARGET])
         situation.counts[i], situation.target[i] = True, target
         other[known.STRENGTH, i] = own[i, known.ABILITY]
-        together.abilities[0] += own[i, known.ABILITY]
-        other[known.ARRIVES, i] = arrival(together, i, target)
-        note_idle(together, i)
+        joint.abilities[0] += own[i, known.ABILITY]
+        other[known.ARRIVES, i] = arrival(joint, i, target)
+        note_idle(joint, i)
     situation.can[:] = True
     expect(situation)
 
 
 @compiled_in_place
-def note_idle(together: Together, i: int) -> None:
+def note_idle(joint: JointDecisions, i: int) -> None:
     """Add an agent to those without a task, or remove it, depending on its target."""
-    own, situation, gaps, column = together.own[i], together.room.situation, together.gaps, together.column
-    tasks, idle, is_manhattan = situation.task, together.idle, own[known.METRIC] == known.MANHATTAN_WAYS
+    own, situation, idle_distances, column = joint.own[i], joint.buffers.situation, joint.idle_distances, joint.column
+    tasks, idle, is_manhattan = situation.task, joint.idle, own[known.METRIC] == known.MANHATTAN_WAYS
     has_none, place = situation.target[i] == NOBODY, column[i]
     if has_none and place == NOBODY:
         place = column[i] = idle[-1]
         idle[place] = i
         idle[-1] += 1
-        for j in range(len(gaps)):
+        for j in range(len(idle_distances)):
             x, y = own[known.X] - tasks[known.TASK_X, j], own[known.Y] - tasks[known.TASK_Y, j]
             z = own[known.Z] - tasks[known.TASK_Z, j]
-            gaps[j, place] = abs(x) + abs(y) + abs(z) if is_manhattan else x * x + y * y + z * z
+            idle_distances[j, place] = abs(x) + abs(y) + abs(z) if is_manhattan else x * x + y * y + z * z
     elif not has_none and place != NOBODY:
         idle[-1] -= 1
         last = idle[-1]
-        for j in range(len(gaps)):
-            gaps[j, place] = gaps[j, last]
+        for j in range(len(idle_distances)):
+            idle_distances[j, place] = idle_distances[j, last]
         idle[place] = idle[last]
         column[idle[place]] = place
         column[i] = NOBODY
 
 
 @compiled_in_place
-def arrival(together: Together, i: int, task: int) -> float:
+def arrival(joint: JointDecisions, i: int, task: int) -> float:
     """Return the arrival hour of an agent at a task; ``-inf`` if it works there."""
-    own = together.own[i]
+    own = joint.own[i]
     if task == NOBODY or (own[known.IS_WORKING] > 0 and own[known.TARGET] == task):
         return -np.inf
-    return float(own[known.HOUR] + together.ways[i, task] / own[known.SPEED])
+    return float(own[known.HOUR] + joint.distances[i, task] / own[known.SPEED])
 
 
 @compiled_in_place
-def decide_together(together: Together, weights: MissionWeights, turns: IntArray, period: float, tasks: int) -> None:
+def decide_in_turn(joint: JointDecisions, weights: MissionWeights, turns: IntArray, period: float, tasks: int) -> None:
     """Let agents decide in turn, each knowing the choices of those before it.
 
     Parameters
     ----------
-    together : Together
+    joint : JointDecisions
     weights : MissionWeights
     turns : ndarray of int
         Indices of the agents; replaced by their choices: a task, `WAIT` or `NOT_DUE`.
@@ -149,105 +149,105 @@ def decide_together(together: Together, weights: MissionWeights, turns: IntArray
     tasks : int
         Number of open tasks.
     """
-    room = together.room
+    buffers = joint.buffers
     for turn in range(len(turns)):
         i = turns[turn]
-        own = together.own[i]
+        own = joint.own[i]
         target = int(own[known.TARGET])
         is_busy = target < tasks if target != NOBODY else own[known.IS_FLYING] > 0
-        if not is_due(room, i, own[known.HOUR], period, tasks, is_busy):
+        if not is_due(buffers, i, own[known.HOUR], period, tasks, is_busy):
             turns[turn] = NOT_DUE
             continue
-        room.decided[i], room.tasks[i] = own[known.HOUR], tasks
-        step_out(together, i, target)
-        count = fill_turn(together, i)
-        score(room.options, count, weights, room.token, room.pooled, room.scores)
-        turns[turn] = room.choice[np.argmax(room.scores[:count])]
-        step_in(together, i, max(turns[turn], NOBODY))
+        buffers.decided[i], buffers.tasks[i] = own[known.HOUR], tasks
+        remove_agent(joint, i, target)
+        count = fill_turn(joint, i)
+        score(buffers.options, count, weights, buffers.token, buffers.pooled, buffers.scores)
+        turns[turn] = buffers.choice[np.argmax(buffers.scores[:count])]
+        add_agent(joint, i, max(turns[turn], NOBODY))
 
 
 @compiled_in_place
-def step_out(together: Together, i: int, target: int) -> None:
+def remove_agent(joint: JointDecisions, i: int, target: int) -> None:
     """Remove an agent from the others, as it is its turn."""
-    situation = together.room.situation
+    situation = joint.buffers.situation
     situation.counts[i] = False
     if target == NOBODY:
         return
-    coming, before = situation.coming, NOBODY
-    if coming.first[target] == i:
-        coming.first[target] = coming.following[i]
+    expected, before = situation.expected, NOBODY
+    if expected.first[target] == i:
+        expected.first[target] = expected.following[i]
     else:
-        before = coming.first[target]
-        while coming.following[before] != i:
-            before = coming.following[before]
-        coming.following[before] = coming.following[i]
-    if coming.last[target] == i:
-        coming.last[target] = before
-    if coming.working[target] == i:
-        coming.working[target] = before
-    renew(situation, target)
+        before = expected.first[target]
+        while expected.following[before] != i:
+            before = expected.following[before]
+        expected.following[before] = expected.following[i]
+    if expected.last[target] == i:
+        expected.last[target] = before
+    if expected.working[target] == i:
+        expected.working[target] = before
+    update_completion(situation, target)
 
 
 @compiled_in_place
-def step_in(together: Together, i: int, target: int) -> None:
+def add_agent(joint: JointDecisions, i: int, target: int) -> None:
     """Add an agent to the others again, with its target."""
-    situation = together.room.situation
+    situation = joint.buffers.situation
     situation.counts[i], situation.target[i] = True, target
-    note_idle(together, i)
+    note_idle(joint, i)
     if target == NOBODY:
         return
-    situation.other[known.ARRIVES, i] = arrival(together, i, target)
-    queue(situation.coming, situation.other[known.ARRIVES], target, i)
-    renew(situation, target)
+    situation.other[known.ARRIVES, i] = arrival(joint, i, target)
+    insert_arrival(situation.expected, situation.other[known.ARRIVES], target, i)
+    update_completion(situation, target)
 
 
 @compiled_in_place
-def renew(situation: Situation, task: int) -> None:
+def update_completion(situation: Situation, task: int) -> None:
     """Recompute when a task is done."""
-    coming = situation.coming
-    coming.others[task], coming.without[task] = done_without(situation, task)
+    expected = situation.expected
+    expected.others[task], expected.without[task] = completion_without(situation, task)
 
 
 @compiled_in_place
-def fill_turn(together: Together, i: int) -> int:
+def fill_turn(joint: JointDecisions, i: int) -> int:
     """Write the options of an agent, as `fill_options` does; return the number of options."""
-    room, situation = together.room, together.room.situation
+    buffers, situation = joint.buffers, joint.buffers.situation
     for number in range(known.OWN):
-        situation.own[number] = together.own[i, number]
-    options, choice, count = room.options, room.choice, 0
+        situation.own[number] = joint.own[i, number]
+    options, choice, count = buffers.options, buffers.choice, 0
     is_same = True
     for j in range(len(situation.can)):
-        situation.can[j] = together.can[i, j]
-        situation.task[known.DISTANCE, j] = together.ways[i, j]
-        is_same &= situation.can[j] == together.crowded[j]
+        situation.can[j] = joint.can[i, j]
+        situation.task[known.DISTANCE, j] = joint.distances[i, j]
+        is_same &= situation.can[j] == joint.crowded[j]
         if situation.can[j]:
             choice[count] = j
             count += 1
     if not is_same:
         for j in range(len(situation.can)):
-            together.crowded[j] = situation.can[j]
-        fill_crowding(situation, choice[:count], together.crowding)
+            joint.crowded[j] = situation.can[j]
+        fill_crowding(situation, choice[:count], joint.crowding)
     options[: count + 1] = 0
     scale = time_scale(situation.own)
     for row in range(count):
         j = choice[row]
         fill_task(situation, j, options[row], 0, scale)
-        options[row, names.CROWDING] = together.crowding[row, names.CROWDING]
-        options[row, names.RIVALS] = squashed_count(nearer(together, i, j))
+        options[row, names.CROWDING] = joint.crowding[row, names.CROWDING]
+        options[row, names.RIVALS] = squashed_count(nearer(joint, i, j))
     choice[count] = WAIT
     options[count, names.STAYS] = 1
-    others = float(len(together.own))
-    fill_shared(situation, choice, count, options[: count + 1], others, together.abilities[0])
+    others = float(len(joint.own))
+    fill_shared(situation, choice, count, options[: count + 1], others, joint.abilities[0])
     return count + 1
 
 
 @inlined
-def nearer(together: Together, i: int, task: int) -> int:
+def nearer(joint: JointDecisions, i: int, task: int) -> int:
     """Return how many other agents without a task are nearer to a task than an agent."""
-    gaps, limit, found = together.gaps[task], together.ways[i, task], 0
-    if together.own[i, known.METRIC] != known.MANHATTAN_WAYS:
+    idle_distances, limit, found = joint.idle_distances[task], joint.distances[i, task], 0
+    if joint.own[i, known.METRIC] != known.MANHATTAN_WAYS:
         limit = limit**2
-    for place in range(together.idle[-1]):
-        found += gaps[place] < limit
-    place = together.column[i]
-    return int(found - (place != NOBODY and gaps[place] < limit))
+    for place in range(joint.idle[-1]):
+        found += idle_distances[place] < limit
+    place = joint.column[i]
+    return int(found - (place != NOBODY and idle_distances[place] < limit))
