@@ -3,6 +3,7 @@
     python tests/benchmarks/missions.py local --csv docs/missions/missions.csv
     python tests/benchmarks/missions.py local --csv new.csv --missions 5 --rows "20/40;10/40" --first-seed 4000000000
     python tests/benchmarks/missions.py growth --agents 500 1000 2000 --plot docs/missions/missions_scale.png
+    python tests/benchmarks/missions.py throughput
 
 `local`: `gappo` against each other policy, on missions that no training, tuning or validation saw. Half of those of a
 row are of the family `steady`, half of `failures`; all policies meet the same. The CSV has a line for each mission,
@@ -11,6 +12,8 @@ The table has, of `gappo` from each other policy in per cent, paired, with its 9
 
 `growth`: seconds of a processor for one mission, with a failure for every five agents. Radii shrink so that an agent
 has about as many neighbours in each. Exponents are those of the power law from one row to the next.
+
+`throughput`: missions per second of a processor in compiled loops, as in training, best and median of rounds.
 """
 
 import argparse
@@ -27,6 +30,9 @@ import numpy as np
 from scipy import stats
 
 from alloc.allocators import Policy, load_policy
+from alloc.allocators.learned.missions.network import compiled_weights
+from alloc.allocators.learned.missions.play import new_buffers, play
+from alloc.allocators.missions.pack import begun, pack
 from alloc.allocators.online.compiled.run import run_compiled
 from alloc.cli.options import listed
 from alloc.problems import Burst, Mission, MissionParameters, Radio, random_mission
@@ -146,6 +152,21 @@ def growth(given: argparse.Namespace) -> None:
         figure.savefig(given.plot)
 
 
+def throughput(given: argparse.Namespace) -> None:
+    """Print how many missions of 20 agents and 40 tasks `gappo` plays per second."""
+    policy = load_policy("gappo")
+    weights, rates = compiled_weights(policy.network), []
+    missions = [
+        pack(random_mission(MissionParameters("steady", 20, 40), FIRST_SEED + i)) for i in range(given.missions)
+    ]
+    for _ in range(given.rounds + 1):
+        began = time.process_time()
+        for seed, mission in enumerate(missions):
+            play(begun(mission, seed), new_buffers(20, 40, policy.parameters.periods), weights, seed)
+        rates.append(len(missions) / (time.process_time() - began))
+    print(f"missions per second: {max(rates[1:]):.0f} at best, median {np.median(rates[1:]):.0f}")  # the first compiles
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     commands = parser.add_subparsers(required=True)
@@ -161,6 +182,10 @@ def main() -> None:
     other.add_argument("--policies", nargs="+", default=["greedy", "gappo"])
     other.add_argument("--plot", type=Path)
     other.set_defaults(command=growth)
+    last = commands.add_parser("throughput")
+    last.add_argument("--missions", type=int, default=60)
+    last.add_argument("--rounds", type=int, default=10)
+    last.set_defaults(command=throughput)
     given = parser.parse_args()
     given.command(given)
 
