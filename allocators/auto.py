@@ -13,10 +13,10 @@ from alloc.problems.text import counted
 PICKED = ("cpsat", "milp", "local-search")
 """Methods that `choose` picks from."""
 
-PAIRS_PER_SECOND, LEAST_PAIRS = 30_000, 15_000
+PAIRS_PER_SECOND, MIN_PAIRS = 30_000, 15_000
 """Pairs of agent class and task per second up to which exact methods are picked, and the minimum of this limit."""
 
-MOST_PAIRS_SEARCHED = 4_000_000
+MAX_PAIRS_SEARCHED = 4_000_000
 """Number of agents times tasks above which the exact methods skip their own searches for plans."""
 
 UNHURRIED_S = 60.0
@@ -29,10 +29,10 @@ def choose(instance: Instance, objective: Objective, budget: Budget) -> tuple[st
     tasks = int((instance.workload > 0).sum())
     pairs = count_classes(instance, by_place=energy) * tasks
     seconds = min(UNHURRIED_S, UNHURRIED_S if budget.time_limit_s is None else budget.time_limit_s)
-    limit = max(LEAST_PAIRS, int(PAIRS_PER_SECOND * seconds))
+    limit = max(MIN_PAIRS, int(PAIRS_PER_SECOND * seconds))
     size = f"{counted(pairs, 'pair')} of agent class and task"
     time = "without a time limit" if budget.time_limit_s is None else f"in {budget.time_limit_s:.3g} s"
-    if pairs <= limit and instance.n * instance.m <= MOST_PAIRS_SEARCHED:
+    if pairs <= limit and instance.n * instance.m <= MAX_PAIRS_SEARCHED:
         return (
             "milp" if energy else "cpsat",
             f"{size}, few enough for a proof, or a small gap, {time} (up to {limit})",

@@ -34,7 +34,7 @@ BOUNDS = {"lower_bound": "makespan", "energy_lower_bound": "energy"}
 CLOSE = 1e-9
 """Relative difference up to which two scores are equal."""
 
-MOST_NAMES = 10
+MAX_NAMES = 10
 """Maximum number of ids of competing tasks in a note."""
 
 
@@ -142,8 +142,8 @@ def _contention(search: Search, decomposition: Decomposition | None) -> str:
     else:
         return "time ran out before it was proven that no plan serves more tasks"
     assert tasks is not None, "tasks are left unserved although a matching serves all"
-    ids = [repr(instance.task_ids[j]) for j in tasks[:MOST_NAMES].tolist()]
-    more = f" and {len(tasks) - MOST_NAMES} more" if len(tasks) > MOST_NAMES else ""
+    ids = [repr(instance.task_ids[j]) for j in tasks[:MAX_NAMES].tolist()]
+    more = f" and {len(tasks) - MAX_NAMES} more" if len(tasks) > MAX_NAMES else ""
     able = len(tasks) - 1
     if not able:
         return f"no agent can take task {ids[0]}"

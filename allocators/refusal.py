@@ -5,7 +5,7 @@ from alloc.allocators.contract.budget import Budget
 from alloc.allocators.contract.built_in import BUILT_IN
 from alloc.allocators.contract.tolerance import EXACT, MakespanTolerance
 from alloc.problems import Instance, Objective, RefusedError
-from alloc.problems.distances.reach import MOST_NEIGHBOURS
+from alloc.problems.distances.reach import MAX_NEIGHBOURS
 
 
 def refuse(
@@ -36,7 +36,7 @@ def _beyond(allocator: Allocator, instance: Instance, objective: Objective, tole
     method = allocator.method
     if not (instance.reach.is_plain or instance.reach.has_table) and instance.reach.neighbours is None:
         return (
-            f"more than {MOST_NEIGHBOURS:,} pairs of places and tasks are within reach; give ranges, or a sparse table"
+            f"more than {MAX_NEIGHBOURS:,} pairs of places and tasks are within reach; give ranges, or a sparse table"
         )
     if instance.has_travel_time and not method.finite_speeds:
         able = [name for name, other in BUILT_IN.items() if other.finite_speeds]

@@ -14,7 +14,7 @@ from alloc.problems.allocation import CarriedOver, require_fit
 from alloc.problems.arguments import choice, of_type, real, whole
 from alloc.problems.vocabulary import OBJECTIVES
 
-MOST_THREADS = 1024
+MAX_THREADS = 1024
 
 Start = Allocation | Result | Mapping[str, str | None]
 """Warm start of a run: an allocation, a result that has one, or a mapping from agent ids to task ids."""
@@ -80,7 +80,7 @@ def checked_tolerance(slack: float, limit: float | None, objective: Objective) -
 
 def checked_threads(threads: int | None) -> int | None:
     """Return the number of threads, or None if none is given."""
-    return None if threads is None else whole(threads, "threads", 1, MOST_THREADS)
+    return None if threads is None else whole(threads, "threads", 1, MAX_THREADS)
 
 
 def default_threads(budget: Budget) -> int:

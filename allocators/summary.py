@@ -25,10 +25,10 @@ STOPS = {
     StopReason.INTERRUPTED: "it was interrupted",
 }
 
-MOST_REASONS = 5
+MAX_REASONS = 5
 """Maximum number of unserved tasks for which the reason is given."""
 
-MOST_LOOKED_AT = 1000
+MAX_LOOKED_AT = 1000
 """Maximum number of unserved tasks for which those are counted that no agent can do."""
 
 LESS = {
@@ -38,7 +38,7 @@ LESS = {
 }
 """How an allocation would be better at the same makespan."""
 
-MOST_NAMES = 8
+MAX_NAMES = 8
 """Maximum number of ids in a list."""
 
 CLOSED_GAP = PROVEN + RELATIVE_TOLERANCE
@@ -84,7 +84,7 @@ def _shortage(result: "Result") -> str:
     """Return how many tasks are unserved, and how many of them no agent can do."""
     instance, tasks = result.instance, () if result.evaluation is None else result.evaluation.unserved_tasks
     unserved = f"{len(tasks)} of {counted(instance.m, 'task')}"
-    lost = sum(not len(instance.reach.agents_of(task)) for task in tasks) if len(tasks) <= MOST_LOOKED_AT else 0
+    lost = sum(not len(instance.reach.agents_of(task)) for task in tasks) if len(tasks) <= MAX_LOOKED_AT else 0
     if lost == len(tasks):
         return f"{unserved} cannot be served by any agent"
     nobody = f", {lost} of them by no agent at all" if lost else ""
@@ -180,7 +180,7 @@ def _reasons(result: "Result") -> list[str]:
     return [
         f"  {one_line(result.instance.task_ids[one.task])}"
         f"{f' (priority {number(one.priority)})' if weights.max() > weights.min() else ''}: {one_line(one.reason)}"
-        for one in result.unserved[:MOST_REASONS]
+        for one in result.unserved[:MAX_REASONS]
     ]
 
 
@@ -247,5 +247,5 @@ def _time(instance: Instance, value: float | None) -> str:
 
 
 def _list(ids: list[str]) -> str:
-    more = f" and {len(ids) - MOST_NAMES} more" if len(ids) > MOST_NAMES else ""
-    return ", ".join(map(one_line, ids[:MOST_NAMES])) + more
+    more = f" and {len(ids) - MAX_NAMES} more" if len(ids) > MAX_NAMES else ""
+    return ", ".join(map(one_line, ids[:MAX_NAMES])) + more

@@ -28,7 +28,7 @@ ORDINARY = (2.0**-7, 2.0**20)
 DEAREST = 2.0**40
 """Cap on scaled costs, which keeps bounds valid; solvers treat much larger costs as infinite."""
 
-MOST_DOUBLINGS = 1000
+MAX_DOUBLINGS = 1000
 """Largest exponent k of a scale 2^k, such that both 2^k and 2^-k are normal floats."""
 
 SCARCE = 32
@@ -229,7 +229,7 @@ def scale_to_one(typical: float) -> float:
     """
     if ORDINARY[0] <= typical <= ORDINARY[1]:
         return 1.0
-    return math.ldexp(1.0, max(-MOST_DOUBLINGS, min(MOST_DOUBLINGS, -math.frexp(typical)[1])))
+    return math.ldexp(1.0, max(-MAX_DOUBLINGS, min(MAX_DOUBLINGS, -math.frexp(typical)[1])))
 
 
 def _check(instance: Instance, time_limit_s: float) -> None:

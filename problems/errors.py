@@ -4,10 +4,10 @@ import difflib
 from collections.abc import Sequence
 from itertools import islice
 
-MOST_NAMES = 10
+MAX_NAMES = 10
 """Maximum number of known names that an error message lists."""
 
-MOST_COMPARED, LONGEST_COMPARED = 1000, 60
+MAX_COMPARED, LONGEST_COMPARED = 1000, 60
 """Limits on the number and the length of names that are compared with an unknown one, as comparison is slow."""
 
 
@@ -47,7 +47,7 @@ class TrainingError(AllocError, RuntimeError):
 
 def closest(name: str, known: Sequence[str]) -> str | None:
     """Return the known name that is most similar to `name`; None if none is similar."""
-    options = [option for option in islice(known, MOST_COMPARED) if len(option) <= LONGEST_COMPARED]
+    options = [option for option in islice(known, MAX_COMPARED) if len(option) <= LONGEST_COMPARED]
     close = difflib.get_close_matches(name[:LONGEST_COMPARED], options, n=1)
     if not close:  # names that differ only in case are similar
         folded = {option.casefold(): option for option in reversed(options)}
@@ -62,8 +62,8 @@ def nearest(name: str, known: Sequence[str]) -> str:
         return f" (did you mean {close!r}?)"
     if not known:
         return ""
-    more = f" and {len(known) - MOST_NAMES} more" if len(known) > MOST_NAMES else ""
-    return f" (known: {', '.join(known[:MOST_NAMES])}{more})"
+    more = f" and {len(known) - MAX_NAMES} more" if len(known) > MAX_NAMES else ""
+    return f" (known: {', '.join(known[:MAX_NAMES])}{more})"
 
 
 def of_these(name: str, known: Sequence[str]) -> str:

@@ -25,7 +25,7 @@ from alloc.problems.text import counted
 OTHERS_S = 0.3
 """Seconds between two polls of the runs that other commands have left."""
 
-MOST_WARM = 12
+MAX_WARM = 12
 """Maximum number of idle processes kept for further runs of their method; the longest idle one is ended first."""
 
 OVERRUN, OVERRUN_S = 1.2, 10.0
@@ -213,7 +213,7 @@ class Campaign:
             worker.end()
             return
         slot.idle[f"{run.method} {run.parameters}"] = worker
-        if sum(len(one.idle) for one in self._slots) > MOST_WARM:
+        if sum(len(one.idle) for one in self._slots) > MAX_WARM:
             slot.idle.pop(next(iter(slot.idle))).end()
 
     def _ending(self, slot: _Slot, figures: Figures) -> Ending:

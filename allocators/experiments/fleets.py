@@ -11,7 +11,7 @@ from alloc.problems.text import counted, number
 FEWEST_DIGITS = 4
 """Minimum number of significant digits of a makespan; more are used to distinguish two."""
 
-MOST_NAMES = 3
+MAX_NAMES = 3
 """Maximum number of ids of agents that are listed; more are given as a number."""
 
 
@@ -69,7 +69,7 @@ def _more(steps: int, like: Sequence[str]) -> str:
 
 
 def _listed(names: Sequence[str]) -> str:
-    return ", ".join(names) if len(names) <= MOST_NAMES else f"{len(names)} agents"
+    return ", ".join(names) if len(names) <= MAX_NAMES else f"{len(names)} agents"
 
 
 def _is_worse(result: Result, now: Result) -> bool:

@@ -24,7 +24,7 @@ SMALL = 10
 LEAST = 3
 """Minimum number of instances for an interval or a test."""
 
-MOST_DRAWN = 20_000_000
+MAX_DRAWN = 20_000_000
 """Maximum number of values that the bootstrap draws at once, to limit memory; enough for 2,000 instances."""
 
 EQUAL = 1e-9
@@ -174,7 +174,7 @@ def interval(values: NDArray[np.float64]) -> tuple[float | None, float | None]:
         (values,),
         np.mean,
         n_resamples=RESAMPLES,
-        batch=max(1, MOST_DRAWN // len(values)),
+        batch=max(1, MAX_DRAWN // len(values)),
         confidence_level=CONFIDENCE,
         method="BCa",
         rng=np.random.default_rng(0),

@@ -10,10 +10,10 @@ from alloc.problems.text import labelled, number, percent
 SLACK = 0.001
 """Slack as a share of the makespan."""
 
-LEAST_SAVING = 0.01
+MIN_SAVING = 0.01
 """Least saving, as a share of the energy, that is reported."""
 
-TIME_SHARE, MOST_S = 0.02, 0.5
+TIME_SHARE, MAX_S = 0.02, 0.5
 """Time of each search, as a share of the time limit, and its maximum in seconds."""
 
 ITERATIONS = 20
@@ -35,7 +35,7 @@ def note_saving(search: Search) -> None:
         return
     least, slow = (_within(search, factor * best.evaluation.makespan) for factor in (1.0, 1.0 + SLACK))
     saving = 1 - slow.energy / min(least.energy, best.evaluation.energy)
-    if saving >= LEAST_SAVING:
+    if saving >= MIN_SAVING:
         units = search.instance.units
         energy, makespan = labelled(number(slow.energy), units.energy), labelled(number(slow.makespan), units.time)
         search.notes.append(
@@ -49,7 +49,7 @@ def _within(search: Search, makespan: float) -> Evaluation:
     limit, enough = search.budget.time_limit_s, search.instance.n
     budget = Budget(None, min(ITERATIONS, enough))
     if limit is not None:
-        budget = Budget(search.elapsed_s + min(MOST_S, TIME_SHARE * limit), enough)
+        budget = Budget(search.elapsed_s + min(MAX_S, TIME_SHARE * limit), enough)
     part = search.part(search.objective, MakespanTolerance(limit=makespan), budget=budget)
     improve(part)
     assert part.best is not None

@@ -25,18 +25,18 @@ from alloc.problems.vocabulary import GEOGRAPHIC, MANHATTAN, Knowledge
 
 Records = NDArray[np.void]
 
-MOST_KNOWN = 50_000_000
+MAX_KNOWN = 50_000_000
 """Limit on the number of values that agents know of tasks, including copies in messages in transit."""
 
-MOST_PAIRS = 1_000_000_000
+MAX_PAIRS = 1_000_000_000
 """The same limit for values on other agents; each takes 4 bytes of memory once it is known."""
 
-MOST_REPORTS = 4_000_000
+MAX_REPORTS = 4_000_000
 """Capacity for reports of agents, unless `REPORTS_EACH` per agent is more."""
 
 REPORTS_EACH = 400
 
-LEAST_COLUMNS, COLUMNS = 40, 8
+MIN_COLUMNS, COLUMNS = 40, 8
 """Minimum number of columns of knowledge arrays, and the number of which it is a multiple, for vectorisation."""
 
 EMPTY = ("reports", "renumbered", "known_", "sent_", "sender", "links")
@@ -66,13 +66,13 @@ def pack(mission: Mission, knowledge: Knowledge | str | None = None, memory: flo
     known = mission.knowledge if knowledge is None else Knowledge(knowledge)
     n, m = instance.n, instance.m
     rows, slots = (n, _on_the_air(mission.radio)) if known is Knowledge.LOCAL else (1, 0)
-    if max((rows + slots * n) * m / MOST_KNOWN, (rows + slots * n) * n / MOST_PAIRS) > 1:
+    if max((rows + slots * n) * m / MAX_KNOWN, (rows + slots * n) * n / MAX_PAIRS) > 1:
         raise RefusedError(f"{n} agents and {m} tasks are too many for the compiled simulation with local knowledge")
     tasks, events = _tasks(mission), _events(mission)
     deadlines = np.flatnonzero(np.isfinite(mission.deadline))
     reports = n + 1
     if known is Knowledge.LOCAL:
-        reports = min(2 * (rows + slots) * n + 2 * n + 1025, max(MOST_REPORTS, REPORTS_EACH * n))
+        reports = min(2 * (rows + slots) * n + 2 * n + 1025, max(MAX_REPORTS, REPORTS_EACH * n))
     head = _head(mission, known, len(events) + len(deadlines) + (known is Knowledge.LOCAL))
     head["memory"], head["limit"] = memory, min(reports, 32 * n + 1024)
     cells = divide(mission, head)
@@ -108,7 +108,7 @@ def pack(mission: Mission, knowledge: Knowledge | str | None = None, memory: flo
 
 def _knowledge(n: int, m: int, rows: int, slots: int, words: int) -> dict[str, FloatArray]:
     """Return the arrays for agents' knowledge and for messages in transit."""
-    wide = max(LEAST_COLUMNS, -(-m // COLUMNS) * COLUMNS)
+    wide = max(MIN_COLUMNS, -(-m // COLUMNS) * COLUMNS)
     known: dict[str, NDArray[np.generic]] = {
         "task_hour": np.full((rows, wide), -1.0),
         "task_left": np.zeros((rows, wide)),

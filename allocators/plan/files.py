@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from alloc.allocators.plan.geojson import to_geojson
-from alloc.allocators.plan.map import MOST_AGENTS, to_html
-from alloc.allocators.plan.spreadsheet import MOST_ROWS, to_csv, to_workbook
+from alloc.allocators.plan.map import MAX_AGENTS, to_html
+from alloc.allocators.plan.spreadsheet import MAX_ROWS, to_csv, to_workbook
 from alloc.problems import InputError, Instance, MissingPackageError
 from alloc.problems.formats import write_bytes_atomically
 from alloc.problems.formats.files import PathLike, is_stream, named
@@ -98,13 +98,13 @@ def check_result_file(path: PathLike, instance: Instance) -> None:
     if suffix == ".xlsx":
         if find_spec("openpyxl") is None:
             raise MissingPackageError(f"{named(path)} needs openpyxl; install with: pip install 'alloc-mrta[tables]'")
-        if max(instance.n, instance.m) >= MOST_ROWS:
-            problem = f"a sheet holds at most {MOST_ROWS} rows, but there are more agents or tasks; write .csv"
+        if max(instance.n, instance.m) >= MAX_ROWS:
+            problem = f"a sheet holds at most {MAX_ROWS} rows, but there are more agents or tasks; write .csv"
     elif suffix == ".geojson" and instance.metric != GEOGRAPHIC:
         problem = f"needs the metric 'geographic', but the instance has {instance.metric!r}; write .html"
     elif suffix == ".html" and np.isnan(instance.task_position).all():
         problem = "needs positions, but no task of the instance has one; write .csv or .xlsx"
-    elif suffix == ".html" and instance.n > MOST_AGENTS:
-        problem = f"is for at most {MOST_AGENTS} agents, but there are {instance.n}; write .csv"
+    elif suffix == ".html" and instance.n > MAX_AGENTS:
+        problem = f"is for at most {MAX_AGENTS} agents, but there are {instance.n}; write .csv"
     if problem:
         raise InputError(problem, source=named(path))

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from alloc.allocators.result import Result
     from alloc.problems.instance import FloatArray
 
-MOST_AGENTS = 20_000
+MAX_AGENTS = 20_000
 """Maximum number of agents; with more, browsers draw the page slowly."""
 
 SIZE = 1000.0

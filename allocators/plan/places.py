@@ -14,7 +14,7 @@ from alloc.problems.vocabulary import GEOGRAPHIC
 STEEPEST = 0.05
 """Least cosine of the latitude by which a map is stretched."""
 
-MOST_BASES = 20_000
+MAX_BASES = 20_000
 """Maximum number of starting places that are shown; of more, which would overlap, a sample is shown."""
 
 
@@ -108,7 +108,7 @@ class Base:
     is_named: bool
 
 
-def bases(instance: Instance, where: Places, most: int = MOST_BASES) -> list[Base]:
+def bases(instance: Instance, where: Places, most: int = MAX_BASES) -> list[Base]:
     """Return the places where agents start, at most `most` evenly sampled ones, and the other bases to return to.
 
     Agents whose position is unknown are left out.

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from alloc.allocators.result import Result
 
-MOST_ROWS = 1_048_576
+MAX_ROWS = 1_048_576
 """Maximum number of rows of a sheet."""
 
 LONGEST_CELL = 32_767

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from alloc.allocators.experiments.fleets import Fleet
     from alloc.allocators.experiments.whatif import WhatIf
 
-MOST_LABELS = 12
+MAX_LABELS = 12
 """Maximum number of fleets of which each is labelled below its bar."""
 
 
@@ -76,14 +76,14 @@ def _bars(axes: "Axes", values: Sequence[float | None], bounds: Sequence[float |
         axes.bar(at, [bound or 0.0 for bound in bounds], color=LIMIT, label="lower bound", width=0.7)
     axes.set_ylim(0, max((value or 0.0 for value in values), default=0.0) * 1.35 or 1.0)
     for place, value in enumerate(values):
-        if value is not None and len(values) <= MOST_LABELS:
+        if value is not None and len(values) <= MAX_LABELS:
             axes.annotate(f"{value:.3g}", (place, value), (0, 2), textcoords="offset points", ha="center", fontsize=9)
     axes.spines[["top", "right"]].set_visible(False)
 
 
 def _name(axes: "Axes", fleets: Sequence["Fleet"]) -> None:
     """Label the bars with the numbers of agents of the fleets, and the changes."""
-    step = -(-len(fleets) // MOST_LABELS)
+    step = -(-len(fleets) // MAX_LABELS)
     labels = [f"{fleet.result.instance.n}\n{_changed(fleet)}" for fleet in fleets]
     axes.set_xticks(range(0, len(fleets), step), labels[::step])
     axes.set_xlabel("agents")

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 WIDE = 3.0
 """Ratio of the largest to the smallest makespan above which the axis is logarithmic."""
 
-MOST_TICKS = 9
+MAX_TICKS = 9
 """Maximum number of tick labels on a logarithmic axis."""
 
 TENTHS = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0)
@@ -100,13 +100,13 @@ def _logarithmic(axes: "Axes") -> None:
 
 
 def log_ticks(low: float, high: float) -> list[float]:
-    """Return round numbers in a range as ticks, at most `MOST_TICKS`; on a long axis, only powers of ten."""
+    """Return round numbers in a range as ticks, at most `MAX_TICKS`; on a long axis, only powers of ten."""
     decades = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
     choices = [(TENTHS, 1), ((1.0, 2.0, 5.0), 1), *(((1.0,), step) for step in range(1, len(decades) + 1))]
     for factors, step in choices:
         ticks = [factor * 10.0**decade for decade in decades[::step] for factor in factors]
         found = [tick for tick in ticks if low <= tick <= high]
-        if len(found) <= MOST_TICKS:
+        if len(found) <= MAX_TICKS:
             return found
     return []
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 MAX_ROWS = 40
 """Number of tasks above which bars are vertical and not labelled."""
 
-MOST_LETTERS = 70
+MAX_LETTERS = 70
 """Number of letters of 7 points that fit into a bar over the whole axis."""
 
 MARGIN = 1.06
@@ -95,7 +95,7 @@ def _name_rows(axes: "Axes", result: "Result", order: "IntArray", top: float) ->
 def _name_groups(axes: "Axes", result: "Result", order: "IntArray", top: float) -> None:
     """Write the names of the agents into the bar of each task, as far as there is room."""
     size = 7.0 if result.instance.m <= 25 else 6.0
-    room = MOST_LETTERS * 7.0 / size * finite_times(result) / top
+    room = MAX_LETTERS * 7.0 / size * finite_times(result) / top
     dark = shades(result) > 0.5
     for place, row in enumerate(task_rows(result, order)):
         text = listed(row.agents, int(room[order[place]])) if row.completion_time else ""

@@ -9,13 +9,13 @@ from alloc.allocators.proof.groups import is_tiny, optimum
 from alloc.problems import Instance, Objective, energy_lower_bound, lp_makespan_lower_bound
 from alloc.problems.evaluation import last_equal
 
-SHARE, MOST_S = 0.02, 0.1
+SHARE, MAX_S = 0.02, 0.1
 """Share of the time limit, and seconds, that a linear programme may take at most before or during the run."""
 
-MOST_AGENTS = 5000
+MAX_AGENTS = 5000
 """Maximum number of agents for bounding the makespan by a linear programme before the run."""
 
-MOST_PAIRS = 500
+MAX_PAIRS = 500
 """Maximum number of agent-task pairs for bounding the energy by one; with more, plans hardly ever meet the bound."""
 
 
@@ -39,7 +39,7 @@ class EarlyProof:
 
     def __init__(self, search: Search) -> None:
         limit = search.budget.time_limit_s
-        self._seconds = MOST_S if limit is None else min(MOST_S, SHARE * limit)
+        self._seconds = MAX_S if limit is None else min(MAX_S, SHARE * limit)
         self._within, self._cost = 0.0, 0.0
         self.hours = self._makespan_bound(search)
         if search.budget.iterations is None:
@@ -93,8 +93,8 @@ def needs_solver(instance: Instance, objective: Objective) -> bool:
 
 def _is_restricted(instance: Instance) -> bool:
     """Return whether there are few agents, no travel times, and not every agent can take every task."""
-    return instance.n <= MOST_AGENTS and not instance.has_travel_time and not instance.reach.is_complete
+    return instance.n <= MAX_AGENTS and not instance.has_travel_time and not instance.reach.is_complete
 
 
 def _has_few_pairs(instance: Instance) -> bool:
-    return instance.n * instance.m <= MOST_PAIRS
+    return instance.n * instance.m <= MAX_PAIRS

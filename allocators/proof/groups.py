@@ -12,7 +12,7 @@ from alloc.problems.bounds import ROUNDING
 from alloc.problems.evaluation import last_equal
 from alloc.problems.instance import FloatArray, IntArray
 
-MOST_AGENTS, MOST_PAIRS = 12, 600_000
+MAX_AGENTS, MAX_PAIRS = 12, 600_000
 """Maximum numbers of agents, and of pairs of disjoint groups over all tasks, which take a few milliseconds."""
 
 
@@ -36,7 +36,7 @@ class Optimum(NamedTuple):
 
 def is_tiny(instance: Instance) -> bool:
     """Return whether all groups of agents can be enumerated within milliseconds."""
-    return instance.n <= MOST_AGENTS and 3**instance.n * instance.m <= MOST_PAIRS
+    return instance.n <= MAX_AGENTS and 3**instance.n * instance.m <= MAX_PAIRS
 
 
 def optimum(instance: Instance, tolerance: MakespanTolerance) -> Optimum | None:
@@ -98,7 +98,7 @@ def _least(value: FloatArray, joined: np.ufunc) -> float:
     return float(least.min())
 
 
-@lru_cache(MOST_AGENTS)
+@lru_cache(MAX_AGENTS)
 def _disjoint(n: int) -> tuple[IntArray, IntArray, IntArray]:
     """Return all pairs of disjoint groups of `n` agents, sorted by union, and the index where each union begins."""
     group, rest = np.zeros(1, dtype=np.intp), np.zeros(1, dtype=np.intp)

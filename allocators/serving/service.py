@@ -26,7 +26,7 @@ from alloc.problems.formats.messages import message_line
 
 LOG = logging.getLogger("alloc.serve")
 
-MOST_METHODS = 16
+MAX_METHODS = 16
 """Maximum number of methods with parameters from requests that stay loaded; the least recently used is dropped."""
 
 
@@ -228,7 +228,7 @@ class Service:
             with self._looking:
                 self._others[key] = method
                 self._others.move_to_end(key)
-                if len(self._others) > MOST_METHODS:
+                if len(self._others) > MAX_METHODS:
                     self._others.popitem(last=False)
         return method
 

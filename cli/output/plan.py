@@ -10,10 +10,10 @@ if TYPE_CHECKING:
     from alloc.allocators import Result
     from alloc.allocators.plan.table import Column, Row, Value
 
-MOST_ROWS = 50
+MAX_ROWS = 50
 """Maximum number of rows of a table."""
 
-MOST_NAMES = 6
+MAX_NAMES = 6
 """Maximum number of agents of a group that are listed."""
 
 LONGEST_NAME = 24
@@ -29,8 +29,8 @@ def plan_tables(result: "Result") -> list[str]:
     instance = result.instance
     if result.allocation is None:
         return []
-    agents = agent_rows(result, np.arange(min(instance.n, MOST_ROWS)))
-    tasks = task_rows(result, np.arange(min(instance.m, MOST_ROWS)))
+    agents = agent_rows(result, np.arange(min(instance.n, MAX_ROWS)))
+    tasks = task_rows(result, np.arange(min(instance.m, MAX_ROWS)))
     return [
         _table(task_columns(instance), tasks, instance.m, "tasks"),
         _table(agent_columns(instance), agents, instance.n, "agents"),
@@ -60,8 +60,8 @@ def _cells(values: "list[Value]") -> list[str]:
 def _cell(value: "float | tuple[str, ...] | None") -> str:
     if not isinstance(value, tuple):
         return number(value, 5)
-    more = f" and {len(value) - MOST_NAMES} more" if len(value) > MOST_NAMES else ""
-    return (", ".join(short_names(value[:MOST_NAMES], LONGEST_NAME)) + more) or "-"
+    more = f" and {len(value) - MAX_NAMES} more" if len(value) > MAX_NAMES else ""
+    return (", ".join(short_names(value[:MAX_NAMES], LONGEST_NAME)) + more) or "-"
 
 
 def _left(values: "list[list[Value]]") -> int:

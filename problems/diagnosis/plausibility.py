@@ -20,7 +20,7 @@ MUCH_MORE = 1000.0
 FEW = 0.05
 """Share of agents that may reach no task without a finding, as in large fleets some are remote."""
 
-MOST_NAMES = 3
+MAX_NAMES = 3
 """Maximum number of ids in a finding."""
 
 
@@ -193,6 +193,6 @@ def _too_few_agents(instance: Instance) -> Iterator[Finding]:
 def named(which: BoolArray, ids: Sequence[str], noun: str) -> str:
     """Return a text with some of the ids in a mask, and their number."""
     count = int(which.sum())
-    names = ", ".join(ids[index] for index in np.flatnonzero(which)[:MOST_NAMES].tolist())
-    cut = ", ..." if count > MOST_NAMES else ""
+    names = ", ".join(ids[index] for index in np.flatnonzero(which)[:MAX_NAMES].tolist())
+    cut = ", ..." if count > MAX_NAMES else ""
     return f"{noun} {names}" if count == 1 else f"{count} of {len(ids)} {noun}s ({names}{cut})"

@@ -12,10 +12,10 @@ from alloc.problems.instance import FloatArray, Instance, IntArray
 from alloc.problems.text import counted, number
 from alloc.problems.vocabulary import IDLE
 
-MOST_TASKS = 10
+MAX_TASKS = 10
 """Maximum number of tasks with a reason, those with the highest priority first."""
 
-MOST_AGENTS = 3
+MAX_AGENTS = 3
 """Maximum number of agents that a reason names."""
 
 
@@ -28,7 +28,7 @@ class Unserved:
     task : int
     priority : float
     able_agents : tuple of int
-        Agents that can take the task, at most `MOST_AGENTS`.
+        Agents that can take the task, at most `MAX_AGENTS`.
     able : int
         Number of all agents that can take it.
     nearest : int or None
@@ -46,7 +46,7 @@ class Unserved:
 
 
 def why_unserved(
-    instance: Instance, allocation: Allocation, most: int = MOST_TASKS, pinned: Collection[int] = ()
+    instance: Instance, allocation: Allocation, most: int = MAX_TASKS, pinned: Collection[int] = ()
 ) -> tuple[Unserved, ...]:
     """Return the reasons why tasks are unserved, those with the highest priority first.
 
@@ -79,13 +79,13 @@ def _why(instance: Instance, allocation: Allocation, task: int, pinned: Collecti
     able = instance.reach.agents_of(task)
     nearest = None if len(able) else _nearest(instance, task)
     reason = _busy(instance, allocation, able, pinned) if nearest is None else _short(instance, nearest, task)
-    first = tuple(able[:MOST_AGENTS].tolist())
+    first = tuple(able[:MAX_AGENTS].tolist())
     return Unserved(task, float(instance.priority[task]), first, len(able), nearest, reason)
 
 
 def _busy(instance: Instance, allocation: Allocation, able: IntArray, pinned: Collection[int]) -> str:
     """Return what the agents that could take the task do instead."""
-    named = able[:MOST_AGENTS].tolist()
+    named = able[:MAX_AGENTS].tolist()
     doing = []
     for agent in named:
         held = int(allocation.task_of_agent[agent])

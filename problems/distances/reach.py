@@ -22,7 +22,7 @@ TOLERANCE = 1e-9
 TABLE_LIMIT = 4_000_000
 """Number of pairs of origin and task up to which full tables are used."""
 
-MOST_NEIGHBOURS = 100_000_000
+MAX_NEIGHBOURS = 100_000_000
 """Maximum number of pairs within reach that are stored as sparse rows."""
 
 Floats = NDArray[np.float64]
@@ -145,8 +145,8 @@ class Reach(ReadOnly):
 
     @cached_property
     def neighbours(self) -> Neighbours | None:
-        """Tasks within reach of each origin; None if there are more than `MOST_NEIGHBOURS` pairs."""
-        if not self.has_table and estimated_pairs(self) > MOST_NEIGHBOURS:
+        """Tasks within reach of each origin; None if there are more than `MAX_NEIGHBOURS` pairs."""
+        if not self.has_table and estimated_pairs(self) > MAX_NEIGHBOURS:
             return None
         return find_neighbours(self)
 

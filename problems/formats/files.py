@@ -15,7 +15,7 @@ STANDARD_STREAM = "-"
 
 PathLike = str | os.PathLike[str]
 
-_MOST_LINKS = 40
+_MAX_LINKS = 40
 """Maximum number of symbolic links to follow, as in the kernel."""
 
 _NO_MOVE = {
@@ -49,7 +49,7 @@ def open_descriptor(path: PathLike) -> int | None:
     text = os.fspath(path)
     own = {os.path.realpath(folder) for folder in ("/dev/fd", "/proc/self/fd", "/proc/thread-self/fd")}
     try:
-        for _ in range(_MOST_LINKS):
+        for _ in range(_MAX_LINKS):
             folder, name = os.path.split(text)
             if name.isdecimal() and os.path.realpath(folder) in own:
                 return int(name)

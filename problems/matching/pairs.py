@@ -20,7 +20,7 @@ TASKS_PER_AGENT = 16
 LARGEST_BLOCK = 1 << 20
 """Maximum number of distances in memory at a time."""
 
-MOST_PAIRS = 8_000_000
+MAX_PAIRS = 8_000_000
 """Maximum number of pairs of a sample."""
 
 LOOKED_AT = 1_000
@@ -176,7 +176,7 @@ class _Found:
     def __init__(self, instance: Instance, agents: IntArray, latest: float, *, by_cost: bool) -> None:
         self.instance, self.agents = instance, agents
         self.last, self.by_cost = last_equal(latest), by_cost
-        self.most = min(len(agents), max(NEAREST, MOST_PAIRS // len(agents)))
+        self.most = min(len(agents), max(NEAREST, MAX_PAIRS // len(agents)))
         self.is_cut = False
         none, nothing = np.zeros(0, dtype=np.intp), np.zeros(0)
         self.parts: list[tuple[IntArray, IntArray, FloatArray, FloatArray]] = [(none, none, nothing, nothing)]

@@ -17,7 +17,7 @@ SAMPLE_SHARE, LONGEST_S = 0.1, 2.0
 MANY_PAIRS = 1_000_000
 """Number of all pairs beyond which a sample is tried first."""
 
-MOST_PAIRS = 50_000_000
+MAX_PAIRS = 50_000_000
 """Maximum number of pairs that are collected."""
 
 
@@ -80,7 +80,7 @@ def _all_within_reach(
     instance: Instance, agents: IntArray, tasks: IntArray, time_left: Clock
 ) -> tuple[IntArray, IntArray] | None:
     """Return the row of the agent and the task of each pair within reach; None if there are too many."""
-    reach, most = instance.reach, min(MOST_PAIRS, GATHERED_PER_SECOND * time_left())
+    reach, most = instance.reach, min(MAX_PAIRS, GATHERED_PER_SECOND * time_left())
     near = reach.neighbours if reach.has_table or estimated_pairs(reach) <= most else None
     if near is None:
         return None

@@ -16,10 +16,10 @@ from alloc.problems.missions.simulation.simulation import Simulation
 from alloc.problems.missions.simulation.state import AgentState, AgentStatus, MissionState, TaskState, TaskStatus
 from alloc.problems.vocabulary import Knowledge
 
-MOST_MOMENTS = 240
+MAX_MOMENTS = 240
 """Number of recorded moments beyond which every other one is dropped."""
 
-MOST_REPORTS = 1_500_000
+MAX_REPORTS = 1_500_000
 """Limit on the number of recorded report hours; with many agents, only the knowledge of some is recorded."""
 
 
@@ -220,7 +220,7 @@ class _Knowledge:
         self._simulation = simulation
         instance = simulation.mission.instance
         self._ids = instance.agent_ids, instance.task_ids
-        count = max(1, min(instance.n, MOST_REPORTS // (MOST_MOMENTS * (instance.n + instance.m))))
+        count = max(1, min(instance.n, MAX_REPORTS // (MAX_MOMENTS * (instance.n + instance.m))))
         self._agents = np.unique(np.linspace(0, instance.n - 1, count).astype(np.intp)).tolist()
         self._interval = simulation.mission.radio.period
         self._hours: list[float] = []
@@ -232,7 +232,7 @@ class _Knowledge:
             return
         self._hours.append(hour)
         self._reports.append(np.array([self._row(agent) for agent in self._agents]))
-        if len(self._hours) > MOST_MOMENTS:
+        if len(self._hours) > MAX_MOMENTS:
             self._interval *= 2
             self._hours, self._reports = self._hours[::2], self._reports[::2]
 

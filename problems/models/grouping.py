@@ -8,7 +8,7 @@ from alloc.problems.classes import AgentClasses, agent_classes, count_classes
 from alloc.problems.errors import RefusedError
 from alloc.problems.instance import Instance
 
-MOST_PAIRS = 2_000_000
+MAX_PAIRS = 2_000_000
 """Maximum number of pairs of agent, or class, and task in a model."""
 
 
@@ -26,12 +26,12 @@ def grouped(instance: Instance, grouping: Grouping) -> AgentClasses:
     Raises
     ------
     RefusedError
-        If there are more than `MOST_PAIRS` pairs of class and task.
+        If there are more than `MAX_PAIRS` pairs of class and task.
     """
     is_single, by_place = grouping is Grouping.AGENT, grouping is Grouping.PLACE
     pairs = instance.m * (instance.n if is_single else count_classes(instance, by_place=by_place))
-    if pairs > MOST_PAIRS:
-        raise RefusedError(f"the model would have up to {pairs} variables; the limit is {MOST_PAIRS}")
+    if pairs > MAX_PAIRS:
+        raise RefusedError(f"the model would have up to {pairs} variables; the limit is {MAX_PAIRS}")
     if not is_single:
         return agent_classes(instance, by_place=by_place)
     agents, reach = np.arange(instance.n), instance.reach

@@ -9,7 +9,7 @@ import numpy as np
 from alloc.problems.allocation import Allocation
 from alloc.problems.errors import InputError, nearest
 from alloc.problems.instance import Instance
-from alloc.problems.models.grouping import MOST_PAIRS, Grouping, grouped
+from alloc.problems.models.grouping import MAX_PAIRS, Grouping, grouped
 from alloc.problems.models.names import SEPARATOR, plain_names
 from alloc.problems.models.programme import RATIO
 
@@ -132,6 +132,6 @@ def _spread(instance: Instance, grouping: Grouping, found: list[Entry]) -> Alloc
 
 def _count(value: float, line: int) -> int:
     """Return a value rounded to an integer, or raise an error if it is not close to one."""
-    if not (-WHOLE <= value <= MOST_PAIRS) or abs(value - round(value)) > WHOLE:
+    if not (-WHOLE <= value <= MAX_PAIRS) or abs(value - round(value)) > WHOLE:
         raise InputError(f"{value:g} is not a number of agents; is this the solution of a relaxation?", f"line {line}")
     return round(value)

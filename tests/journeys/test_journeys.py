@@ -22,7 +22,7 @@ JOURNEYS = [
     for path in sorted(HERE.glob("*/journey.sh"))
 ]
 NOTEBOOKS = HERE.parents[1] / "examples" / "notebooks"
-MOST_LINES = 15
+MAX_LINES = 15
 SCRIPTS = Path(sys.executable).parent
 
 
@@ -69,4 +69,4 @@ def test_journey(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
 def test_no_journey_needs_much_code(script: Path) -> None:
     """A journey that cannot do without code has at most fifteen lines of it."""
     lines = [line for line in script.read_text(encoding="utf-8").splitlines() if line.strip()]
-    assert len(lines) <= MOST_LINES
+    assert len(lines) <= MAX_LINES

@@ -153,7 +153,7 @@ def test_neighbours_are_gathered_only_where_they_can_be_held(limit: float) -> No
         task_position=rng.random((m, 3)),
         communication_range=np.full(n, limit),
     )
-    with patch.object(reach, "MOST_NEIGHBOURS", 100_000):
+    with patch.object(reach, "MAX_NEIGHBOURS", 100_000):
         near = instance.reach.neighbours
     assert (near is None) == (limit > 0.4)
     assert not instance.reach.is_complete

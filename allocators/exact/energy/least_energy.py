@@ -22,7 +22,7 @@ SHARE_WITHOUT_SOLVER = 0.3
 SHARE_WITHOUT_GROUPS = 0.1
 """Share of the time before groups are counted, as better plans soon reduce their number."""
 
-MOST_GROUPS = FEW_GROUPS, 15_000
+MAX_GROUPS = FEW_GROUPS, 15_000
 """Numbers of groups, tried in turn, up to which an integer programme selects among them if bounds no longer rise."""
 
 SOLVER_GAP = 1e-7
@@ -88,7 +88,7 @@ def _least_cost(state: EnergyState, solver: Solver) -> float:
     if both.closed or is_over(search):
         return both.bound
     bound = both.bound
-    for most in MOST_GROUPS:
+    for most in MAX_GROUPS:
         if bound < state.cost * (1 - SOLVER_GAP) and not is_over(search):
             groups = groups or both.groups_of_cheapest(most)
             bound = bound if groups is None else max(bound, _solve_groups(state, both, groups))

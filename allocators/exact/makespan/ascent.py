@@ -35,7 +35,7 @@ PATIENCE, MAX_PATIENCE = 12, 100
 DEFLECTION = 0.5
 """Share of the last direction that is added to the subgradient."""
 
-LEAST_RISE = 1e-6
+MIN_RISE = 1e-6
 """Smallest increase of theta that counts as progress."""
 
 SMALL_RISE, LARGEST_RISE = 0.005, 0.1
@@ -101,7 +101,7 @@ class ConfigurationAscent:
         if is_excluded:
             self.proven = self._time
             self._time *= 1 + max(min(SMALL_RISE, theta - 1), min(LARGEST_RISE, (theta - 1) / 4))
-        if is_excluded or theta > self._best + LEAST_RISE:
+        if is_excluded or theta > self._best + MIN_RISE:
             self._best, self._best_price, self._stale = min(1.0, theta), self._price, 0
             if np.isfinite(theta):
                 self.task_price = costs / self._model.workload

@@ -12,7 +12,7 @@ FIRST_ASCENT, ASCENT = 0.05, 0.5
 """Time share of the first ascent, usually enough for prices that guide the search for plans, and the share of the time
 for bounds that later ascents take, as they soon gain little."""
 
-LEAST_ASCENT_S = 0.05
+MIN_ASCENT_S = 0.05
 """Minimum duration of an ascent in seconds."""
 
 REPEATABLE_ROUNDS = 60
@@ -25,7 +25,7 @@ def raise_bound_by_configurations(state: MakespanState, share: float) -> None:
     if state.ended or state.partial:
         return
     if state.model.travel_time is not None:
-        _ascend(state, state.search.elapsed_s + state.share_s(ASCENT * share, LEAST_ASCENT_S))
+        _ascend(state, state.search.elapsed_s + state.share_s(ASCENT * share, MIN_ASCENT_S))
         return
     if first:
         configurations = ConfigurationProgramme(state.model, state.lower)
@@ -49,7 +49,7 @@ def raise_bound_by_relaxation(state: MakespanState) -> None:
     if instance.has_travel_time:
         state.ascent = ConfigurationAscent(state.model, state.lower)
         if state.ascent.is_tractable:
-            _ascend(state, state.search.elapsed_s + state.share_s(FIRST_ASCENT, LEAST_ASCENT_S))
+            _ascend(state, state.search.elapsed_s + state.share_s(FIRST_ASCENT, MIN_ASCENT_S))
             return
     bound, state.price = relaxed_lower_bound(
         state.model, state.lower, state.upper, state.share_s(0.2), lambda: state.over

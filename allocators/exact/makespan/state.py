@@ -24,10 +24,10 @@ TIGHT = 1e-8
 UNLIMITED_S = 60.0
 """Seconds to which the shares of phases refer without a time limit."""
 
-LEAST_WEIGHT = 1 / 8
+MIN_WEIGHT = 1 / 8
 """Smallest weight of a phase that finds nothing, relative to its usual time."""
 
-LEAST_SHARE = 0.2
+MIN_SHARE = 0.2
 """Lower limit, as a share of the stage, on the time until the fastest plan in the criterion of patience."""
 
 TELLING_SHARE = 0.05
@@ -145,7 +145,7 @@ class MakespanState:
             return False
         assert self.search.fastest is not None
         last_s = max(self.begin_s, self.search.fastest.time_s)
-        took_s = max(last_s - self.begin_s, LEAST_SHARE * (self.until_s - self.begin_s))
+        took_s = max(last_s - self.begin_s, MIN_SHARE * (self.until_s - self.begin_s))
         return self.search.elapsed_s - last_s > self.patience * took_s
 
     @property
@@ -213,7 +213,7 @@ class MakespanState:
 
 def reweighted(weight: float, *, found: bool) -> float:
     """Return the next weight of a phase: 1 if its last turn found something, otherwise less."""
-    return 1.0 if found else max(LEAST_WEIGHT, weight / 2)
+    return 1.0 if found else max(MIN_WEIGHT, weight / 2)
 
 
 def _simple_bound(search: Search, model: Model) -> float:

@@ -22,7 +22,7 @@ from alloc.problems.formats.npz import to_npz
 LEASE_S = 60.0
 """Duration of a lease, unless renewed, of a process that cannot be observed."""
 
-MOST_KEYS = 500
+MAX_KEYS = 500
 """Maximum number of keys in a query, as SQLite limits the parameters of a statement."""
 
 LIMITS = ("time_limit_s", "iterations", "target_gap", "deadline_ms")
@@ -136,8 +136,8 @@ class Store:
         """Take a lease on the first of these runs that has neither ended nor a lease."""
         done: set[str] = set()
         with self._transaction():
-            for start in range(0, len(keys), MOST_KEYS):
-                part = keys[start : start + MOST_KEYS]
+            for start in range(0, len(keys), MAX_KEYS):
+                part = keys[start : start + MAX_KEYS]
                 ended, leased = self._ended(part), self._leased(part)
                 done |= ended
                 free = next((key for key in part if key not in ended and key not in leased), None)
@@ -214,8 +214,8 @@ class Store:
         with explained(self.path):
             if keys is None:
                 found |= map(record_of, self._connection.execute(f"SELECT {columns} FROM runs"))
-            for start in range(0, len(keys or ()), MOST_KEYS):
-                part = (keys or ())[start : start + MOST_KEYS]
+            for start in range(0, len(keys or ()), MAX_KEYS):
+                part = (keys or ())[start : start + MAX_KEYS]
                 rows = self._connection.execute(f"SELECT {columns} FROM runs WHERE key IN ({_marks(part)})", part)
                 found |= map(record_of, rows)
         return found

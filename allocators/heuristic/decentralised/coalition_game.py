@@ -14,7 +14,7 @@ from alloc.problems import IDLE, Allocation, Instance, Objective
 from alloc.problems.evaluation import last_equal
 from alloc.problems.instance import FloatArray, IntArray
 
-MOST_CELLS = 30_000_000
+MAX_CELLS = 30_000_000
 """Largest value of n (n + m), as each of the n agents stores the plan of all agents."""
 
 EVALUATIONS_PER_SLICE = 500_000
@@ -40,20 +40,20 @@ class HedonicParameters(CheckedParameters):
     stamp_noise : float
         Noise on the precedence of agents, from the second game on.
     most_dissolved : int
-        From 2 to ``most_dissolved + 1`` groups are dissolved before the next game.
+        From 2 to this number of groups are dissolved before the next game.
     """
 
     communication_radius: float | None = bounded(None, low=0, infinite=True)
     partners: int = bounded(64, low=0)
     distance_weight: float = bounded(8.0, low=0)
     stamp_noise: float = bounded(0.5, low=0)
-    most_dissolved: int = bounded(3, low=2)
+    most_dissolved: int = bounded(4, low=2)
 
 
 def too_many_agents(instance: Instance) -> str | None:
     """Return why each agent cannot store the plan of all agents, None if it can."""
-    if instance.n * (instance.n + instance.m) > MOST_CELLS:
-        return f"each of {instance.n} agents would store the plan of all; at most about {int(MOST_CELLS**0.5)} can"
+    if instance.n * (instance.n + instance.m) > MAX_CELLS:
+        return f"each of {instance.n} agents would store the plan of all; at most about {int(MAX_CELLS**0.5)} can"
     return None
 
 
@@ -126,7 +126,7 @@ class CoalitionGame:
             order *= np.linalg.norm(position - position[rng.integers(instance.m)], axis=1)
         elif rng.random() < 0.5:
             order[best.evaluation.completion_time.argmax()] = -1.0
-        dissolved = np.argsort(order)[: int(rng.integers(2, self.parameters.most_dissolved + 2))]
+        dissolved = np.argsort(order)[: int(rng.integers(2, self.parameters.most_dissolved + 1))]
         task = best.allocation.task_of_agent.copy()
         task[np.isin(task, dissolved)] = IDLE
         self.begin(Allocation(task))

@@ -15,10 +15,10 @@ from alloc.allocators.heuristic.genetic.islands import Island, evolve_islands
 from alloc.allocators.heuristic.greedy.list_schedule import greedy
 from alloc.problems import Allocation, Instance, Objective, serve_all
 
-MOST_AGENTS = 200_000
+MAX_AGENTS = 200_000
 """Number of agents above which a generation takes longer than a run may exceed its time limit."""
 
-MOST_PAIRS = 20_000_000
+MAX_PAIRS = 20_000_000
 """Number of pairs of origin and task above which the table of distances takes longer than that."""
 
 
@@ -54,12 +54,12 @@ class GeneticAlgorithm(Allocator):
 
     def refusal(self, instance: Instance, objective: Objective, budget: Budget) -> str | None:
         """Refuse instances for which a single generation would take most of a usual time limit."""
-        if instance.n > MOST_AGENTS:
-            return f"it handles at most {MOST_AGENTS} agents, not {instance.n}; use greedy"
+        if instance.n > MAX_AGENTS:
+            return f"it handles at most {MAX_AGENTS} agents, not {instance.n}; use greedy"
         pairs = instance.reach.pairs
         by_place = objective is Objective.MAKESPAN_ENERGY or not instance.reach.is_complete
-        if by_place and pairs > MOST_PAIRS:
-            return f"it handles at most {MOST_PAIRS} pairs of starting place and task, not {pairs}; use greedy"
+        if by_place and pairs > MAX_PAIRS:
+            return f"it handles at most {MAX_PAIRS} pairs of starting place and task, not {pairs}; use greedy"
         return None
 
     def allocate(self, search: Search) -> Proposal:

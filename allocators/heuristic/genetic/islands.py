@@ -14,7 +14,7 @@ from alloc.problems import Allocation
 TARGETS = (0.0, 0.5, 0.8, 0.95)
 """Target makespans of successive epochs, between the lower bound (0) and the best so far (1)."""
 
-MOST_ISLANDS = 32
+MAX_ISLANDS = 32
 """Maximum number of islands; further threads are not used."""
 
 GENERATIONS = 10
@@ -70,7 +70,7 @@ def evolve_islands(search: Search, encoding: Encoding, parameters: GeneticParame
 
     Cohoon, Hegde, Martin and Richards (1987), ICGA, 148-154.
     """
-    found: list[deque[Allocation]] = [deque() for _ in range(min(search.threads, MOST_ISLANDS))]
+    found: list[deque[Allocation]] = [deque() for _ in range(min(search.threads, MAX_ISLANDS))]
     parts = [
         search.part(search.objective, search.tolerance, lambda new, kept=kept: kept.append(new.allocation))  # type: ignore[misc]
         for kept in found

@@ -15,13 +15,13 @@ from alloc.problems import IDLE, Allocation, Instance, Objective, makespan_lower
 CHECK_EVERY = 256
 """Agents between two checks of the clock."""
 
-MOST_SCANNED = 20_000
+MAX_SCANNED = 20_000
 """Number of agents up to which scanning all tasks is as fast as loading compiled code."""
 
 SLICE = 4_096
 """Number of agents that compiled code assigns between two checks of the clock."""
 
-LEAST_SHARED = 25_000
+MIN_SHARED = 25_000
 """Minimum number of agents per thread."""
 
 SHARED = 0.9
@@ -72,7 +72,7 @@ def load_compiled(instance: Instance) -> None:
 
 
 def _is_scanned(instance: Instance) -> bool:
-    return instance.reach.has_table and instance.n <= MOST_SCANNED
+    return instance.reach.has_table and instance.n <= MAX_SCANNED
 
 
 def _by_tree(instance: Instance, search: Search | None) -> NDArray[np.intp]:
@@ -85,7 +85,7 @@ def _by_tree(instance: Instance, search: Search | None) -> NDArray[np.intp]:
         return np.full(instance.n, IDLE, dtype=np.intp)
     horizon = makespan_lower_bound(instance) if search is None else search.lower_bound
     tree, order = TreeGreedy(instance, horizon), np.array(_order(instance))
-    threads = 1 if search is None else min(search.threads, instance.n // LEAST_SHARED)
+    threads = 1 if search is None else min(search.threads, instance.n // MIN_SHARED)
     shared = int(SHARED * instance.n) if threads > 1 else 0
 
     def assign(part: TreeGreedy, agents: NDArray[np.intp]) -> None:

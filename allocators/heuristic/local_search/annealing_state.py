@@ -38,7 +38,7 @@ LOWEST, HIGHEST = 0.1, 100.0
 EXCHANGES_PER_AGENT = 5.0
 """Length of a period, in exchanges per agent."""
 
-LEAST_EXCHANGES = 250.0
+MIN_EXCHANGES = 250.0
 """Least exchanges per agent of a budget with an adaptive penalty, which takes many periods."""
 
 PATIENCE = 3
@@ -249,7 +249,7 @@ class PenaltyFactor:
 
     def __init__(self, state: AnnealingState, exchanges: int, allowed: float) -> None:
         self.value, self._state = 1.0, state
-        self._period = EXCHANGES_PER_AGENT * state.instance.n / exchanges if allowed >= LEAST_EXCHANGES else math.inf
+        self._period = EXCHANGES_PER_AGENT * state.instance.n / exchanges if allowed >= MIN_EXCHANGES else math.inf
         self._iterations, self._short_periods = 0, 0
 
     def update(self, iterations: int) -> None:

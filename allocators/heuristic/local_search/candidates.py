@@ -15,7 +15,7 @@ from alloc.allocators.heuristic.local_search.instance_arrays import (
 from alloc.problems import Instance
 from alloc.problems.instance import FloatArray
 
-MOST_ROWS = 100_000
+MAX_ROWS = 100_000
 """Number of origins up to which each has its own candidates; with more, they have those of their nearest task."""
 
 SAMPLE_SIZE = 1000
@@ -55,7 +55,7 @@ def arrays_and_candidates(instance: Instance, count: int) -> tuple[InstanceArray
         cost = table if reach.cost_is_distance else np.where(reach.mask, reach.cost, np.inf)
         arrays = arrays._replace(distance=table, cost=cost)
         row, of_origin = np.arange(origins), _nearest_by_table(table, count)
-    elif origins <= MOST_ROWS:
+    elif origins <= MAX_ROWS:
         row, of_origin = np.arange(origins), _nearest_by_position(arrays.origin_position, arrays.task_position, count)
     else:
         nearest = _nearest_by_position(arrays.origin_position, arrays.task_position, 1)[:, 0]

@@ -6,7 +6,7 @@ from alloc.allocators.heuristic.local_search.distances import compute_distance, 
 from alloc.allocators.heuristic.local_search.instance_arrays import InstanceArrays
 from alloc.allocators.heuristic.local_search.moves import apply_subset
 from alloc.allocators.heuristic.local_search.plan import (
-    MOST_SUMS,
+    MAX_SUMS,
     NOISE_SIZE,
     POOL_BY_HALVES,
     POOL_BY_SUMS,
@@ -107,7 +107,7 @@ def exchange(
     """
     if plan.demand[other] < plan.demand[task] and other != plan.demand.shape[0] - 1:
         task, other = other, task
-    by_sums = weights.integer_ability * POOL_BY_SUMS < MOST_SUMS
+    by_sums = weights.integer_ability * POOL_BY_SUMS < MAX_SUMS
     most = POOL_BY_SUMS // 2 if by_sums else POOL_BY_HALVES // 2
     enumerated = POOL_ENUMERATED if arrays.instant_travel else POOL_TRAVELLING
     if plan.size[task] + plan.size[other] <= enumerated:

@@ -9,7 +9,7 @@ from alloc.allocators.contract.clock import Clock
 from alloc.allocators.contract.search import Search
 from alloc.allocators.heuristic.local_search.annealing_state import AnnealingState, PenaltyFactor
 from alloc.allocators.heuristic.local_search.parameters import LocalSearchParameters
-from alloc.allocators.heuristic.local_search.parts import MOST_STATES, Attempt, Parts, Team, tighten
+from alloc.allocators.heuristic.local_search.parts import MAX_STATES, Attempt, Parts, Team, tighten
 from alloc.allocators.heuristic.task_prices.start import PricedPlan
 from alloc.allocators.parallel.pool import thread_map
 from alloc.problems import IDLE, Allocation, Objective, only_allowed
@@ -25,7 +25,7 @@ HARD_FROM = 0.95
 FIRST_CYCLE_SHARE = 0.1
 """Share of a long budget for a first annealing cycle, so that a run that is stopped early has a good plan."""
 
-PATIENCE, LEAST_SHARE = 3.0, 0.2
+PATIENCE, MIN_SHARE = 3.0, 0.2
 """The search for less makespan ends if the time since the last improvement is this multiple of the time before it, but
 not before this share of its time has passed."""
 
@@ -75,7 +75,7 @@ def improve(
     if clock.is_over:
         return
     parameters = parameters or LocalSearchParameters()
-    with thread_map(min(search.threads, MOST_STATES)) as run_all:
+    with thread_map(min(search.threads, MAX_STATES)) as run_all:
         _improve(search, Team.of(search, parameters.neighbours, run_all), parameters, clock, priced)
 
 
@@ -132,7 +132,7 @@ class MakespanReduction:
         """Continue until the clock ends, from the end of the last run or from a better plan found elsewhere.
 
         With `patience`, ends early when the time since the last improvement is that multiple of the time before it, but
-        not in the first `LEAST_SHARE` of the clock.
+        not in the first `MIN_SHARE` of the clock.
         """
         search, improved = self._search, 0.0
         assert search.fastest is not None
@@ -144,7 +144,7 @@ class MakespanReduction:
             fastest = search.fastest.evaluation
             best = fastest.served_makespan
             bound = min(search.lower_bound, best) if fastest.makespan is not None else 0.5 * best
-            has_waited = patience is not None and clock.progress > max(LEAST_SHARE, (1 + patience) * improved)
+            has_waited = patience is not None and clock.progress > max(MIN_SHARE, (1 + patience) * improved)
             if has_waited or bound >= best * (1 - RELATIVE_TOLERANCE):
                 return
             self._attempt(clock, bound, best)

@@ -13,10 +13,10 @@ from alloc.allocators.parallel.pool import RunAll
 from alloc.problems.evaluation import RELATIVE_TOLERANCE
 from alloc.problems.instance import FloatArray, IntArray
 
-MOST_STATES = 32
+MAX_STATES = 32
 """Maximum number of annealing states; further threads are not used."""
 
-LEAST_TASKS = 8
+MIN_TASKS = 8
 """Minimum number of tasks in a part."""
 
 DRAWS = 1.3
@@ -32,10 +32,10 @@ AGENTS_PER_RUN = 2_000
 """Number of agents per additional run in a round, as the time for dividing and merging a plan grows with its size."""
 
 
-PATIENCE_PER_TASK, LEAST_PATIENCE = 10.0, 10
+PATIENCE_PER_TASK, MIN_PATIENCE = 10.0, 10
 """Exchanges per task, and least number of iterations, without fewer short tasks after which an attempt ends."""
 
-MOST_FAILURES = 3
+MAX_FAILURES = 3
 """Number of consecutive rounds of attempts without success after which other searches continue."""
 
 
@@ -50,7 +50,7 @@ class Team:
     def of(cls, search: Search, neighbours: int, run_all: RunAll) -> "Team":
         """Return a team for the threads of a run; its first state is the same as with a single thread."""
         first = AnnealingState(search.instance, search.seed, neighbours)
-        clones = [first.clone([search.seed, number]) for number in range(1, min(search.threads, MOST_STATES))]
+        clones = [first.clone([search.seed, number]) for number in range(1, min(search.threads, MAX_STATES))]
         return cls([first, *clones], run_all)
 
 
@@ -110,7 +110,7 @@ class Parts:
     def __init__(self, team: Team, seed: int) -> None:
         self.team, self.state, self.rng = team, team.states[0], np.random.default_rng(seed)
         tasks = int(np.count_nonzero(self.state.plan.demand))
-        self.count = max(1, min(len(team.states), tasks // LEAST_TASKS))
+        self.count = max(1, min(len(team.states), tasks // MIN_TASKS))
         first = [self.state.clone(seed)] if self.count > 1 else []
         self._parts = [*first, *team.states[1 : self.count]]
 
@@ -176,7 +176,7 @@ def tighten(search: Search, team: Team, priced: PricedPlan, clock: Clock, exchan
         Number of exchanges per iteration.
     """
     plan, count = priced.allocation, len(team.states)
-    patience = max(LEAST_PATIENCE, int(PATIENCE_PER_TASK * search.instance.m / exchanges))
+    patience = max(MIN_PATIENCE, int(PATIENCE_PER_TASK * search.instance.m / exchanges))
     fraction, failures = 0.5, 0
 
     def attempt(number: int) -> int:
@@ -191,7 +191,7 @@ def tighten(search: Search, team: Team, priced: PricedPlan, clock: Clock, exchan
                 least, waited = state.n_short, 0
         return done
 
-    while failures < MOST_FAILURES and not clock.is_over and not search.fast_enough:
+    while failures < MAX_FAILURES and not clock.is_over and not search.fast_enough:
         assert search.fastest is not None
         best = search.fastest.evaluation.served_makespan
         bound = min(search.lower_bound, best)

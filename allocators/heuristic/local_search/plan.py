@@ -23,7 +23,7 @@ POOL_BY_HALVES = 16
 NOISE_SIZE = 4096
 """Number of random numbers that are drawn in advance."""
 
-MOST_SUMS = 1 << 14
+MAX_SUMS = 1 << 14
 """Maximum number of sums of abilities in the dynamic programme."""
 
 N_SHORT, N_MOVES, FULL_GROUP, N_LOGGED = 0, 1, 2, 3
@@ -32,7 +32,7 @@ N_SHORT, N_MOVES, FULL_GROUP, N_LOGGED = 0, 1, 2, 3
 LOG_SIZE = 512
 """Number of last moves that are logged, enough for the longest ejection chain and its undoing; a power of two."""
 
-MOST_TOUCHED = 8
+MAX_TOUCHED = 8
 """Maximum number of groups that an ejection chain changes."""
 
 CURRENT, BEST = 0, 1
@@ -102,7 +102,7 @@ class Workspace(NamedTuple):
         Contribution of each agent to the first and to the other task.
     extra_cost, cost : ndarray
         Cost of the flight to the first task minus that to the other one, and the same weighted and with noise.
-    sum_cost, sum_set : ndarray, shape (2 * MOST_SUMS,)
+    sum_cost, sum_set : ndarray, shape (2 * MAX_SUMS,)
         Least cost for each sum of abilities, and a subset that attains it, as bits; two rows of the dynamic programme.
     subset_ability, subset_other_ability, subset_cost, subset_bits : ndarray
         Subsets of the pool, or of its halves.
@@ -224,14 +224,14 @@ def workspace(seed: int | list[int]) -> Workspace:
         other_ability=other_ability,
         extra_cost=extra_cost,
         cost=cost,
-        sum_cost=np.empty(2 * MOST_SUMS),
-        sum_set=np.empty(2 * MOST_SUMS, dtype=np.uint64),
+        sum_cost=np.empty(2 * MAX_SUMS),
+        sum_set=np.empty(2 * MAX_SUMS, dtype=np.uint64),
         subset_ability=subset_ability,
         subset_other_ability=subset_other_ability,
         subset_cost=subset_cost,
         subset_bits=np.empty(1 << POOL_ENUMERATED, dtype=np.int64),
-        touched=np.zeros(MOST_TOUCHED, dtype=np.int32),
-        touched_ability=np.zeros(MOST_TOUCHED),
-        touched_penalty=np.zeros(MOST_TOUCHED),
+        touched=np.zeros(MAX_TOUCHED, dtype=np.int32),
+        touched_ability=np.zeros(MAX_TOUCHED),
+        touched_penalty=np.zeros(MAX_TOUCHED),
         logistic=np.log(uniform / (1 - uniform)),
     )

@@ -6,7 +6,7 @@ shortfalls of both tasks, which are computed from their `Needs`.
 
 import numpy as np
 
-from alloc.allocators.heuristic.local_search.plan import MOST_SUMS, POOL_BY_HALVES, Needs, Weights, Workspace
+from alloc.allocators.heuristic.local_search.plan import MAX_SUMS, POOL_BY_HALVES, Needs, Weights, Workspace
 from alloc.allocators.runtime.compiled import compiled
 
 UNSERVED_PENALTY = 1e12
@@ -43,7 +43,7 @@ def best_by_sums(
     """
     missing, other_missing, price, other_price, all_in_pool, other_all_in_pool = needs
     cost, sets, sizes, costs = work.sum_cost, work.sum_set, work.ability, work.cost
-    old, new = np.uint64(0), np.uint64(MOST_SUMS)
+    old, new = np.uint64(0), np.uint64(MAX_SUMS)
     one, top = np.uint64(1), np.uint64(0)
     last = np.uint64(largest_sum)
     cost[0], sets[0] = 0.0, np.uint64(0)

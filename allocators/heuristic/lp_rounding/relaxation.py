@@ -13,7 +13,7 @@ from alloc.problems.instance import FloatArray
 SAFETY = 1e-9
 """Relative amount added to the optimal makespan of the relaxation, so that it is feasible in floating point."""
 
-MOST_STEPS = 8
+MAX_STEPS = 8
 """Maximum number of linear programmes for the least fractional makespan; one is enough without travel times."""
 
 
@@ -51,7 +51,7 @@ class Relaxation:
     def least_makespan(self, search: Search) -> float | None:
         """Return approximately the least makespan of a fractional allocation in hours, or None without an answer."""
         makespan = search.lower_bound
-        for _ in range(MOST_STEPS):
+        for _ in range(MAX_STEPS):
             matrix = vstack(
                 [
                     hstack([-self._coverage(self.task_share(makespan)), csr_array(np.ones((self._n_tasks, 1)))]),

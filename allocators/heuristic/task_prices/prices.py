@@ -33,7 +33,7 @@ samples are small. With more iterations at a time, prices may diverge if agents 
 FINE = ((0.025, 35), (0.0125, 25))
 """Widths and iterations for all agents."""
 
-LEAST_SPREAD = 1e-3
+MIN_SPREAD = 1e-3
 """Least spread of values, for instances with negligible travel times."""
 
 COARSE_LENGTH, FINE_LENGTH = 32, 12
@@ -48,7 +48,7 @@ PROMISING = 1e-5
 CORRECTIONS = 20
 """Number of steps from which the quasi-Newton method estimates the curvature."""
 
-LEAST_SLOPE = 1e-4
+MIN_SLOPE = 1e-4
 """Gradient component, relative to the mean share of a task in the value, up to which prices count as converged."""
 
 LARGEST_EXPONENT = 50.0
@@ -168,7 +168,7 @@ class TaskPrices:
         for per_task, steps in COARSE:
             sample = self._bidders(*representatives(self.instance, per_task * int(self._some.sum())), COARSE_LENGTH)
             best, best_price = self._renew(sample), self.price
-            spread = max(LEAST_SPREAD, float((sample.lists.lost.max(axis=1) - sample.lists.lost[:, 0]).mean()))
+            spread = max(MIN_SPREAD, float((sample.lists.lost.max(axis=1) - sample.lists.lost[:, 0]).mean()))
             for width, iterations in steps:
                 if is_over():
                     return False
@@ -245,6 +245,6 @@ class TaskPrices:
             if is_over():
                 raise StopIteration
 
-        options = {"maxiter": iterations, "maxcor": CORRECTIONS, "gtol": LEAST_SLOPE / len(work), "ftol": 0.0}
+        options = {"maxiter": iterations, "maxcor": CORRECTIONS, "gtol": MIN_SLOPE / len(work), "ftol": 0.0}
         start = np.concatenate([np.log(self.price[some]) / unit, np.zeros(regions.shape[1])])
         self.price = price_of(minimize(dual, start, jac=True, method="L-BFGS-B", callback=check, options=options).x)

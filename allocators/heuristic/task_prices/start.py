@@ -17,7 +17,7 @@ TIME_SHARE = 0.5
 CLOSE = 0.003
 """Gap up to which the current plan is the better start, as plans from prices are hardly closer to the bound."""
 
-MOST_THREADS = 32
+MAX_THREADS = 32
 """Maximum number of threads that are used."""
 
 
@@ -43,7 +43,7 @@ def plan_by_prices(search: Search) -> PricedPlan | None:
     if not are_prices_used(instance) or search.lower_bound <= 0 or search.fast_enough or search.should_stop():
         return None
     end = time.monotonic() + TIME_SHARE * search.remaining_s
-    threads = min(search.threads, MOST_THREADS)
+    threads = min(search.threads, MAX_THREADS)
     with thread_map(threads) as run_all:
         prices = TaskPrices(instance, search.lower_bound, run_all, threads)
         helped = prices.improve(end, lambda: search.interrupted)

@@ -2,10 +2,10 @@
 
 from alloc.problems import Instance
 
-LEAST_AGENTS = 5_000
+MIN_AGENTS = 5_000
 """Number of agents below which linear programmes and exchanges alone do as well."""
 
 
 def are_prices_used(instance: Instance) -> bool:
     """Return whether there are many agents, and tasks differ in reach or travel times."""
-    return instance.n >= LEAST_AGENTS and (instance.has_travel_time or not instance.reach.is_complete)
+    return instance.n >= MIN_AGENTS and (instance.has_travel_time or not instance.reach.is_complete)

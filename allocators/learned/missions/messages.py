@@ -3,7 +3,7 @@
 from alloc.allocators.runtime.compiled import compiled_in_place
 from alloc.problems.fields import IntArray
 
-MOST_SAVED = 3
+MAX_SAVED = 3
 """Maximum number of messages for which an agent saves up radio periods."""
 
 
@@ -26,7 +26,7 @@ def should_send(periods: int, saved: IntArray, counted: IntArray, news: IntArray
     """
     if periods == 1:
         return True
-    saved[row] = min(MOST_SAVED * periods, saved[row] + tick - counted[row])
+    saved[row] = min(MAX_SAVED * periods, saved[row] + tick - counted[row])
     counted[row] = tick
     if saved[row] < (1 if news[row] else 2) * periods:
         return False

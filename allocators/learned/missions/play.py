@@ -6,7 +6,7 @@ import numpy as np
 
 from alloc.allocators.learned.missions.exploring import CELLS, centre, find_unseen, record_seen
 from alloc.allocators.learned.missions.forward import score
-from alloc.allocators.learned.missions.messages import MOST_SAVED, should_send
+from alloc.allocators.learned.missions.messages import MAX_SAVED, should_send
 from alloc.allocators.learned.missions.neighbours import PeerView, needs_prediction, new_peer_view, predict_neighbours
 from alloc.allocators.learned.missions.network_arrays import HIDDEN, WIDTH, MissionWeights, Singles
 from alloc.allocators.learned.missions.options import WAIT, fill_options
@@ -96,7 +96,7 @@ def new_buffers(n: int, m: int, periods: int = 1) -> Buffers:
         decided=np.full(n, -np.inf),
         tasks=np.zeros(n, np.intp),
         periods=periods,
-        saved=np.full(n, MOST_SAVED * periods, np.intp),
+        saved=np.full(n, MAX_SAVED * periods, np.intp),
         counted=np.zeros(n, np.intp),
         news=np.zeros(n, np.intp),
     )

@@ -15,7 +15,7 @@ PLACES = 12
 LARGEST = 3_000_000
 """Number of pairs above which a game takes more than a few gigabytes."""
 
-MOST_TASKS = 4_000
+MAX_TASKS = 4_000
 """Number of tasks above which the attention between them takes more than a few gigabytes."""
 
 
@@ -23,8 +23,8 @@ def too_large(instance: Instance, budget: Budget) -> str | None:
     """Return why a game on `instance` would not end within `budget`, or None if it would."""
     n, m = instance.n, instance.m
     pairs = n * (min(NEAR, m) + 1)
-    if m > MOST_TASKS:
-        return f"{m} tasks are more than the {MOST_TASKS} that it has memory for; use local-search"
+    if m > MAX_TASKS:
+        return f"{m} tasks are more than the {MAX_TASKS} that it has memory for; use local-search"
     if pairs > LARGEST:
         return f"{n} agents are more than the {LARGEST // (NEAR + 1)} that it has memory for; use local-search"
     seconds = (pairs + m * m // PLACES) / PAIRS_PER_SECOND

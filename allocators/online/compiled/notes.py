@@ -18,7 +18,7 @@ from alloc.problems.missions.simulation.reports import BYTES_OF_VALUE
 PARTITION, BIDS = 1, 3
 """Kinds of notes; the value is how many numbers there are for each agent."""
 
-MOST_NOTES = 250_000_000
+MAX_NOTES = 250_000_000
 """Largest total size of the notes of all agents; larger missions are refused."""
 
 TASK, AMOUNT, HOUR = range(3)
@@ -52,7 +52,7 @@ def notes_for(kind: int, n: int, slots: int) -> Notes:
     RefusedError
         If there are too many agents for notes on all others.
     """
-    if kind * n * n * (2 + slots) > MOST_NOTES:
+    if kind * n * n * (2 + slots) > MAX_NOTES:
         raise RefusedError(f"{n} agents are too many for a policy in which each agent keeps notes on all others")
     row = np.zeros(kind * n + 2 * (kind == PARTITION))
     row[: n * (kind > 0)] = NOBODY

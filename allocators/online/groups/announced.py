@@ -4,7 +4,7 @@ import math
 from collections.abc import Collection, Sequence, Set
 from dataclasses import dataclass
 
-MOST_GONE = 200
+MAX_GONE = 200
 """Smallest number of routes of agents that are no longer known that are kept."""
 
 
@@ -101,7 +101,7 @@ class Announced:
         hour, patience : float
             As for `taken`.
         """
-        if len(self.routes) <= 2 * (len(known) + MOST_GONE):
+        if len(self.routes) <= 2 * (len(known) + MAX_GONE):
             return
         owners = self._owners(frozenset(), hour, patience)
         needed = {agent for name, (_, _, agent) in owners.items() if name in tasks}

@@ -25,7 +25,7 @@ from alloc.allocators.online.routes.situation import (
 PORTION, PORTION_S = 8, 0.001
 """Number of changes before the clock is first checked, and target of the seconds between two checks."""
 
-MOST_GROWTH, CAUTION = 4.0, 0.5
+MAX_GROWTH, CAUTION = 4.0, 0.5
 """Largest growth factor of the batch of tasks inserted at once, and safety factor on the estimated batch size."""
 
 CROWDED = 0.7
@@ -122,7 +122,7 @@ def _is_crowded(situation: Situation) -> bool:
 
 def _next_size(size: int, seconds: float, left: float) -> int:
     """Return the size of the next batch, given the seconds of the last one; the time grows with the size squared."""
-    return max(1, int(size * min(MOST_GROWTH, CAUTION * math.sqrt(left / max(seconds, 1e-9)))))
+    return max(1, int(size * min(MAX_GROWTH, CAUTION * math.sqrt(left / max(seconds, 1e-9)))))
 
 
 def first_tasks(situation: Situation, routes: Ints, lengths: Ints) -> Ints:

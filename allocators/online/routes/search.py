@@ -34,7 +34,7 @@ WAYS = len(SIZES) + 1
 Plan = tuple[Ints, Ints]
 """Routes and their lengths."""
 
-MOST_OUT, MOST_NEAR, MOST_WAITING, MOST_MEETINGS, BY_TIME = 7, 10, 4, 2, 0.6
+MAX_OUT, MAX_NEAR, MAX_WAITING, MAX_MEETINGS, BY_TIME = 7, 10, 4, 2, 0.6
 """Limits on the visits of a removed segment, on unplanned tasks near it and elsewhere that are inserted with them, and
 on tasks for which a coalition is sought; probability of removing by time rather than by distance."""
 
@@ -65,7 +65,7 @@ def _take_out(r: Schedule, nearest: Ints, routes: Ints, lengths: Ints, near: Int
     if lengths[i] == 0:
         return
     p = np.random.randint(lengths[i])
-    seed, most = routes[i, p], 1 + np.random.randint(MOST_OUT)
+    seed, most = routes[i, p], 1 + np.random.randint(MAX_OUT)
     by_time = np.random.random() < BY_TIME
     begin, end = r.arrive[i, p], r.arrive[i, min(p + most, lengths[i]) - 1]
     share = 1.0 if np.random.random() < 0.5 else 0.3
@@ -121,13 +121,13 @@ def rebuild(
         find_slack(s, r, routes, lengths, slack, i)
     has_deadline = _has_deadline(s)
     waiting = _waiting(
-        s, routes, lengths, near, has_deadline, MOST_WAITING if is_partial else 0, MOST_NEAR if is_partial else m
+        s, routes, lengths, near, has_deadline, MAX_WAITING if is_partial else 0, MAX_NEAR if is_partial else m
     )
     balance = 0.02 if has_deadline else 1.0
     alone = has_deadline and (not is_partial or np.random.random() < 0.5)
     if alone:
         insert_cheapest(s, r, routes, lengths, slack, waiting, balance)
-    meetings = MOST_MEETINGS if is_partial else len(waiting)
+    meetings = MAX_MEETINGS if is_partial else len(waiting)
     for j in waiting:
         if j < 0 or (not alone and insert_best(s, r, routes, lengths, slack, j, balance, BLINK)):
             continue

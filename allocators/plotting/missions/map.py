@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.text import Annotation
 
-MOST_NAMES = 40
+MAX_NAMES = 40
 """Number of tasks above which none is labelled."""
 
 MARKS = {DONE: "o", MISSED: "X", CANCELLED: "s"}
@@ -175,7 +175,7 @@ def _draw_tracks(axes: "Axes", course: Course, plane: Plane) -> None:
 def name_tasks(axes: "Axes", course: Course, plane: Plane) -> "dict[int, Annotation]":
     """Label tasks where there is room, and return the labels by task; the layout must be final."""
     instance = course.mission.instance
-    if instance.m > MOST_NAMES:
+    if instance.m > MAX_NAMES:
         return {}
     size, place = 8.0, plane.where.tasks
     names = [plain_text(name) for name in short_names(instance.task_ids, 18)]

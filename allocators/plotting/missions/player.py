@@ -19,7 +19,7 @@ from alloc.problems.missions.simulation.state import AgentStatus
 from alloc.problems.text import one_line
 from alloc.problems.vocabulary import Knowledge
 
-MOST_MESSAGES = 60_000
+MAX_MESSAGES = 60_000
 """Maximum number of messages on the page; of more, every k-th is kept."""
 
 STEPS = 65_534
@@ -60,7 +60,7 @@ def _text_of(name: str) -> str:
 def document(course: Course) -> Entry:
     """Return the content of the page: positions on the map, hours, and states as indices."""
     instance, plane = course.mission.instance, plane_of(course.mission.instance)
-    every = -(-len(course.messages) // MOST_MESSAGES) or 1
+    every = -(-len(course.messages) // MAX_MESSAGES) or 1
     sensing, radius = course.mission.sensing, course.mission.radio.radius
     return {
         "summary": title(course).replace("\\$", "$").split("\n"),

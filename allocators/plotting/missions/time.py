@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 POINTS = 700
 """Number of hours at which curves are evaluated."""
 
-MOST_ROWS = 45
+MAX_ROWS = 45
 """Number of agents above which their rows are not labelled."""
 
 LETTER = 0.62
@@ -107,7 +107,7 @@ def draw_gantt(axes: "Axes", course: Course) -> None:
     from matplotlib.patches import Patch
 
     n = len(course.legs)
-    height = 0.82 if n <= MOST_ROWS else 1.0
+    height = 0.82 if n <= MAX_ROWS else 1.0
     found = set()
     for agent, legs in enumerate(course.legs):
         for state in {doing(leg) for leg in legs if leg.end > leg.begin} - {None}:
@@ -119,13 +119,13 @@ def draw_gantt(axes: "Axes", course: Course) -> None:
                 (agent - height / 2, height),
                 facecolors=AGENT_COLOURS[state],
                 edgecolor="white",
-                linewidth=0.7 if n <= MOST_ROWS else 0,
-                rasterized=n > MOST_ROWS,
+                linewidth=0.7 if n <= MAX_ROWS else 0,
+                rasterized=n > MAX_ROWS,
             )
     axes.set_xlim(0, course.end or 1.0)
     axes.set_ylim(n - 0.4, -0.6)
     axes.set_xlabel(heading("time", course.mission.instance.units.time))
-    if n <= MOST_ROWS:
+    if n <= MAX_ROWS:
         names = [plain_text(name) for name in short_names(course.mission.instance.agent_ids, 16)]
         axes.set_yticks(range(n), names, fontsize=8 if n <= 25 else 6)
         axes.tick_params(axis="y", length=0)
@@ -146,7 +146,7 @@ def draw_gantt(axes: "Axes", course: Course) -> None:
 def name_work(axes: "Axes", course: Course) -> None:
     """Write the names of tasks into the bars of working agents where there is room; the layout must be final."""
     n = len(course.legs)
-    if n > MOST_ROWS:
+    if n > MAX_ROWS:
         return
     size = 7.0 if n <= 25 else 5.5
     names = short_names(course.mission.instance.task_ids, 14)

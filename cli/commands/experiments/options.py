@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 SIZE = re.compile(r"(\d+(?:\.\d+)?)\s*([MG])i?B?", re.IGNORECASE)
 """Pattern of an amount of memory, such as 800M or 4G."""
 
-LEAST_MB = 100.0
+MIN_MB = 100.0
 """Least memory in which a run can start."""
 
 
@@ -153,6 +153,6 @@ def _megabytes(text: str | None) -> float | None:
     if found is None:
         raise typer.BadParameter(f"must be an amount such as 800M or 4G, got {text!r}", param_hint="'--memory'")
     size = float(found[1]) * (1024 if found[2].upper() == "G" else 1)
-    if size < LEAST_MB:
-        raise typer.BadParameter(f"must be at least {LEAST_MB:g}M, or no run can start", param_hint="'--memory'")
+    if size < MIN_MB:
+        raise typer.BadParameter(f"must be at least {MIN_MB:g}M, or no run can start", param_hint="'--memory'")
     return size

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 FAMILY = re.compile(r"(paper-[1-4]|random|covering)(?:\[(.*)\])?:(\d{1,9})(?:-(\d{1,9}))?")
 """Pattern of a generated family with a range of seeds, both ends included."""
 
-MOST_GENERATED = 100_000
+MAX_GENERATED = 100_000
 
 COLUMN = "instance"
 """Column of a table of instances that names them; other columns are ignored."""
@@ -98,8 +98,8 @@ def _generated(source: str, family: str, settings: str | None, first: str, last:
     from alloc.problems import Family, InputError, paper, random_instance
 
     seeds = range(int(first), int(last or first) + 1)
-    if not 0 < len(seeds) <= MOST_GENERATED:
-        raise InputError(f"must be an ascending range of at most {MOST_GENERATED} seeds", source=source)
+    if not 0 < len(seeds) <= MAX_GENERATED:
+        raise InputError(f"must be an ascending range of at most {MAX_GENERATED} seeds", source=source)
     try:
         given: dict[str, Any] = values(BETWEEN_SETTINGS.split(settings) if settings else [])
         if family == "covering":

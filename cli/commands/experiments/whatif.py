@@ -27,7 +27,7 @@ EXAMPLES = examples(
 
 LIKE = "like "
 
-MOST_NAMES = 3
+MAX_NAMES = 3
 """Ids of agents that a row of the table lists; more are given as a number."""
 
 
@@ -146,7 +146,7 @@ def _table(found: "WhatIf") -> str:
 
 def _changes(fleet: "Fleet") -> str:
     """Return the agents that a fleet lacks and has in addition, such as ``-d7 +2``."""
-    less = [f"-{name}" for name in fleet.removed] if len(fleet.removed) <= MOST_NAMES else [f"-{len(fleet.removed)}"]
+    less = [f"-{name}" for name in fleet.removed] if len(fleet.removed) <= MAX_NAMES else [f"-{len(fleet.removed)}"]
     return " ".join([*less, *([f"+{len(fleet.added)}"] if fleet.added else [])]) or "as it is"
 
 

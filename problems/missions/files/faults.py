@@ -14,7 +14,7 @@ from alloc.problems.missions.files.document import (
 )
 from alloc.problems.missions.mission import Mission
 
-MOST_FAULTS = 20
+MAX_FAULTS = 20
 
 KNOWN = {"agents": (*AGENT_FIELDS, *HOURS_OF_AGENT), "tasks": (*TASK_FIELDS, *HOURS_OF_TASK)}
 
@@ -36,10 +36,10 @@ def mission_faults(document: object, *, default_name: str = DEFAULT_NAME) -> tup
     -------
     mission : Mission or None
     faults : list of InputError
-        At most `MOST_FAULTS`.
+        At most `MAX_FAULTS`.
     """
     repair, faults = _Repair(document), list[InputError]()
-    while len(faults) < MOST_FAULTS:
+    while len(faults) < MAX_FAULTS:
         try:
             mission = mission_from_document(repair.document, default_name=default_name)
         except InputError as error:

@@ -16,7 +16,7 @@ KM = 0.403716
 SPEED_KM_H = 60.0
 """Speed of a crew on the road; not part of the records."""
 
-LEAST_HA = 0.1
+MIN_HA = 0.1
 """Minimum workload, also for fires without a recorded size."""
 
 
@@ -42,7 +42,7 @@ def read_new_brunswick(path: str, options: RecordOptions) -> Records:
         if when is None or x is None or y is None:
             lost += 1
             continue
-        work = max(LEAST_HA, table.number(row, "size") or 0.0)
+        work = max(MIN_HA, table.number(row, "size") or 0.0)
         found.records.append(Record(f"fire{row}", when, (x * KM, y * KM), work))
     if lost:
         found.notes.append(f"{counted(lost, 'fire')} without a place or a day left out")

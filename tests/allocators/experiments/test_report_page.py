@@ -98,7 +98,7 @@ def test_methods_are_compared_with_a_reference(store, tmp_path, monkeypatch):
     """The first method is the reference, or the one that is asked for; an unknown one is an error that names all."""
     found = written(store, tmp_path)["main"]["groups"][0]["paired"]
     assert {row["against"] for row in found} == {0, 1}  # the third one solved nothing
-    monkeypatch.setattr(summary_module, "MOST_PAIRED", 0)
+    monkeypatch.setattr(summary_module, "MAX_PAIRED", 0)
     assert {row["against"] for row in written(store, tmp_path)["main"]["groups"][0]["paired"]} == {0}
     asked = written(store, tmp_path, against="ga[population=4]")["main"]["groups"][0]["paired"]
     assert {row["against"] for row in asked} == {1}
@@ -140,7 +140,7 @@ def test_maps_contain_places_groups_and_plans(store, tmp_path):
     assert shown["agent"]["id"] == ["a1", "a2", "a3"]
     plan = next(one for one in shown["plans"] if one["method"] == 0)
     assert (plan["of"], plan["count"], plan["ability"], plan["done"]) == ([0, 0, 1], [2, 1], [3.0, 3.0], [1.0, 1.0])
-    assert (detail[str(number)]["groups"], main["most_traces"]) == ([0], details_module.MOST_TRACES)
+    assert (detail[str(number)]["groups"], main["most_traces"]) == ([0], details_module.MAX_TRACES)
     assert main["edges_s"] == pytest.approx(EDGES_S, rel=1e-5)
     worst = next(one for one in shown["plans"] if one["method"] == 1)
     assert (worst["done"][1], worst["count"]) == (None, [3, 0])
@@ -150,7 +150,7 @@ def test_maps_contain_places_groups_and_plans(store, tmp_path):
 
 def test_large_instances_are_sampled_and_maps_limited_in_size(store, tmp_path, monkeypatch):
     """Maps of large instances show a subset of agents and tasks; beyond the size limit, instances have no map."""
-    for limit in ("MOST_AGENTS", "MOST_TASKS"):
+    for limit in ("MAX_AGENTS", "MAX_TASKS"):
         monkeypatch.setattr(details_module, limit, 1)
     shown = written(store, tmp_path)["detail-0"]["0"]["map"]
     assert (len(shown["agent"]["id"]), len(shown["task"]["id"]), shown["agents"], shown["tasks"]) == (1, 1, 3, 2)

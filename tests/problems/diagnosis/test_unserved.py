@@ -6,7 +6,7 @@ from tiny_instances import scarce_instance, varied_instance
 
 from alloc.allocators import solve
 from alloc.problems import Allocation, DistanceTable, Instance, evaluate
-from alloc.problems.diagnosis.unserved import MOST_TASKS, why_unserved
+from alloc.problems.diagnosis.unserved import MAX_TASKS, why_unserved
 
 FLEET = Instance(
     ability=[1, 2, 1],
@@ -81,7 +81,7 @@ def test_reasons_are_true(seed: int) -> None:
         assert plan is not None
         score = evaluate(instance, plan)
         found = why_unserved(instance, plan)
-        assert len(found) == min(MOST_TASKS, len(score.unserved_tasks))
+        assert len(found) == min(MAX_TASKS, len(score.unserved_tasks))
         for one in found:
             able = np.flatnonzero(
                 [bool(instance.reach.allows(np.array([i]), np.array([one.task]))[0]) for i in range(instance.n)]

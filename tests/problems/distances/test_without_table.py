@@ -22,7 +22,7 @@ def tableless() -> Iterator[None]:
         patch.object(reach, "TABLE_LIMIT", -1),
         patch.object(candidates, "TABLE_LIMIT", -1),
         patch.object(instance_arrays, "TABLE_LIMIT", -1),
-        patch.object(list_schedule, "MOST_SCANNED", -1),
+        patch.object(list_schedule, "MAX_SCANNED", -1),
     ):
         yield
 

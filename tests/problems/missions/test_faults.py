@@ -9,7 +9,7 @@ import pytest
 from alloc.problems import InputError, MissionParameters, random_mission
 from alloc.problems.formats import json_text
 from alloc.problems.missions.files.document import mission_from_document, mission_to_document
-from alloc.problems.missions.files.faults import MOST_FAULTS, mission_faults
+from alloc.problems.missions.files.faults import MAX_FAULTS, mission_faults
 
 GOOD = {
     "format": "alloc-mission/1",
@@ -97,7 +97,7 @@ def test_number_of_reported_faults_is_limited():
     """Of very many faults only the first ones are reported, and the given document is not modified."""
     document = faulty(events=[{"hour": -1, "event": "agent-fails", "agent": "a1"}] * 50)
     before = copy.deepcopy(document)
-    assert len(places(document)) == MOST_FAULTS
+    assert len(places(document)) == MAX_FAULTS
     assert document == before
 
 

@@ -20,20 +20,20 @@ from alloc.allocators.exact.energy.energy_model import EnergyModel, Mask
 from alloc.allocators.exact.energy.subproblems import solve_subproblems
 from alloc.problems.instance import FloatArray, IntArray
 
-LEAST_VIOLATION = 0.02
+MIN_VIOLATION = 0.02
 """Least violation of an added cut, scaled to a largest coefficient of 1."""
 
-MOST_ROUNDS, MUCH_MORE = 40, 1.1
+MAX_ROUNDS, MUCH_MORE = 40, 1.1
 """Limit on the solutions computed for one cut, and the possible growth of its violation needed to compute more."""
 
-TURN, MOST_CUTS = 60, 40
+TURN, MAX_CUTS = 60, 40
 """Limits on clusters that are separated, and on cuts found, before the mixture is updated."""
 
-WHOLE, MOST_BROKEN = 1e-6, 30
+WHOLE, MAX_BROKEN = 1e-6, 30
 """Distance from an integer from which agents count as fractional, and number of fractional classes above which a
 cluster is skipped."""
 
-MOST_KNOWN, MOST_SHARING = 2000, 500
+MAX_KNOWN, MAX_SHARING = 2000, 500
 """Limits on the clusters whose knapsacks are cached, and on clusters of tasks that share agents."""
 
 PRECISION = 1e-9
@@ -99,13 +99,13 @@ class ClusterSeparation:
         np.add.at(mixed, task, part[:, None] * use)
         member = self._member
         if len(member):
-            member = np.unique(np.vstack([member, sharing_clusters(mixed, MOST_SHARING)]), axis=0)
+            member = np.unique(np.vstack([member, sharing_clusters(mixed, MAX_SHARING)]), axis=0)
         broken = (_distance_from_whole(member.astype(float) @ mixed) > WHOLE).sum(axis=1)
         self._turn += 1
         pausing = np.array([self._due.get(inside.tobytes(), 0) > self._turn for inside in member], dtype=bool)
         order, tried = np.lexsort((broken, pausing)), 0
-        for f in order[(broken[order] > 0) & (broken[order] <= MOST_BROKEN)].tolist():
-            if should_stop() or len(cuts) >= MOST_CUTS or (cuts and (tried >= TURN or pausing[f])):
+        for f in order[(broken[order] > 0) & (broken[order] <= MAX_BROKEN)].tolist():
+            if should_stop() or len(cuts) >= MAX_CUTS or (cuts and (tried >= TURN or pausing[f])):
                 break
             if self._knapsack(member[f]).need[0] > 0:
                 tried += 1
@@ -124,7 +124,7 @@ class ClusterSeparation:
         """Return the knapsack of a cluster, built on first use, as there are many."""
         key = inside.tobytes()
         if key not in self._knapsacks:
-            if len(self._knapsacks) >= MOST_KNOWN:
+            if len(self._knapsacks) >= MAX_KNOWN:
                 self._knapsacks.clear()
                 for known in (self._points, self._due, self._pause):
                     known.clear()
@@ -184,10 +184,10 @@ def _most_violated(
         Initial solutions.
     """
     function = _Separator(agents, points, is_exact=bool(knapsack.max_weight[0] >= 0))
-    best, found, limit, known = LEAST_VIOLATION, None, 0.0, [points]
-    for _ in range(MOST_ROUNDS):
+    best, found, limit, known = MIN_VIOLATION, None, 0.0, [points]
+    for _ in range(MAX_ROUNDS):
         factor, most = function.most_violated()
-        if most < max(LEAST_VIOLATION, MUCH_MORE * best):
+        if most < max(MIN_VIOLATION, MUCH_MORE * best):
             break
         point, _, cost = solve_subproblems(knapsack, -factor, compare=False)
         if not np.isfinite(cost):

@@ -33,18 +33,18 @@ PRECISION, EARLY = 1e-5, 0.05
 """Relative difference between bound and programme at which prices count as optimal; share of the gap to the plan at
 which cuts are added before that."""
 
-FIRST_NODES, MORE_NODES, MOST_NODES = 20_000, 4, 4_000_000
+FIRST_NODES, MORE_NODES, MAX_NODES = 20_000, 4, 4_000_000
 """Limit on the nodes of the search for one group at first, its growth factor, and the limit on all searches of a round,
 less than a second."""
 
-MOST_LOST = 0.1
+MAX_LOST = 0.1
 """Share of the gap to the plan that truncated searches for groups may cost. Beyond it, longer searches are allowed; if
 even the longest ones lose as much, cuts over classes, which slow them down, are removed."""
 
 MORE = 8
 """Factor on the number of enumerated groups, as earlier prices exclude many of them."""
 
-MOST_KEPT = 0.95
+MAX_KEPT = 0.95
 """Pairs are dropped only if at most this share of them is kept."""
 
 MAX_PAIRS, MAX_CLASSES, MAX_CELLS, MAX_USES = 30_000, 1000, 20_000_000, 200_000
@@ -161,8 +161,8 @@ class CuttingPlanes:
         price = smoothing * self._price + (1 - smoothing) * master.price
         penalty = smoothing * known + (1 - smoothing) * master.penalty
         value, group, least = self._relax(price, penalty)
-        if self._lost(group, least, price, penalty) > MOST_LOST * max(0.0, cost - max(self.bound, value)):
-            if MORE_NODES * self._nodes * len(self._need) <= MOST_NODES:
+        if self._lost(group, least, price, penalty) > MAX_LOST * max(0.0, cost - max(self.bound, value)):
+            if MORE_NODES * self._nodes * len(self._need) <= MAX_NODES:
                 self._nodes *= MORE_NODES
                 return
             known[master.leave_out_sets()] = 0.0
@@ -205,7 +205,7 @@ class CuttingPlanes:
             return False  # a search for a group was truncated
         more = excess + (unpenalised - least)[model.task_of_pair]
         self.least_with, stay = value + more, value + more <= cost * (1 + 1e-9)
-        if stay.mean() > MOST_KEPT:
+        if stay.mean() > MAX_KEPT:
             return False
         self.least_with = self.least_with[stay]
         self.kept[self.kept] = stay

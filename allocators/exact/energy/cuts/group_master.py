@@ -13,10 +13,10 @@ from alloc.allocators.exact.knapsack import WholeArray
 from alloc.allocators.runtime.interrupts import run_native
 from alloc.problems.instance import FloatArray, IntArray
 
-LEAST_VIOLATION, MOST_FOUND = 0.05, 5000
+MIN_VIOLATION, MAX_FOUND = 0.05, 5000
 """Least violation of an added cut over classes, and limit on the number of violated ones considered."""
 
-MOST_CUTS, MOST_OF_CLASS = 60, 4
+MAX_CUTS, MAX_OF_CLASS = 60, 4
 """Limits on cuts over classes added at once, and on those among them with the same class."""
 
 SMALL_GROUP = 12
@@ -28,7 +28,7 @@ DUAL_SIMPLEX, PRIMAL_SIMPLEX = 1, 4
 ROOM, ROOM_FOR_CUTS = 1024, 64
 """Initial capacities for groups and cuts."""
 
-MOST_ENTRIES = 2**25
+MAX_ENTRIES = 2**25
 """Limit on the entries of the tables of groups by classes and by cuts, a quarter of a gigabyte each."""
 
 
@@ -105,7 +105,7 @@ class GroupMaster:
         """Whether there is room for another group or cut; enlarge the tables if memory allows."""
         rows, cuts = self._used.shape
         more_groups, more_cuts = not cut and self._groups == rows, cut and len(self.limit) == cuts
-        if (1 + more_groups) * rows * max(self._use.shape[1], (1 + more_cuts) * cuts) > MOST_ENTRIES:
+        if (1 + more_groups) * rows * max(self._use.shape[1], (1 + more_cuts) * cuts) > MAX_ENTRIES:
             return not (more_groups or more_cuts)
         if more_groups:
             self._use, self._used, self._task, self._cost = (
@@ -229,11 +229,11 @@ class GroupMaster:
 
     def _separate_sets(self, on: IntArray) -> None:
         use = np.ascontiguousarray(self._use[on].T.astype(np.int64))
-        sets, excess = violated_sets(use, self._part[on], self._count, LEAST_VIOLATION, MOST_FOUND)
+        sets, excess = violated_sets(use, self._part[on], self._count, MIN_VIOLATION, MAX_FOUND)
         times, new = np.zeros(len(self._count)), 0
         for row in np.argsort(-excess, kind="stable").tolist():
             members = sets[row][self._count[sets[row]] > 0]
-            if new < MOST_CUTS and (times[members] < MOST_OF_CLASS).all() and self._has_room(cut=True):
+            if new < MAX_CUTS and (times[members] < MAX_OF_CLASS).all() and self._has_room(cut=True):
                 times[members] += 1
                 new += 1
                 self._sets, self._set_at = np.vstack([self._sets, sets[row]]), np.append(self._set_at, len(self.limit))

@@ -9,7 +9,7 @@ from alloc.allocators.exact.energy.energy_model import EnergyModel, Mask
 from alloc.allocators.exact.knapsack import WholeArray
 from alloc.problems.instance import FloatArray, IntArray
 
-MOST_KNOWN, MOST_CELLS = 40, 2_000_000
+MAX_KNOWN, MAX_CELLS = 40, 2_000_000
 """Limits on the number of prices kept, and on the cells of all their tables."""
 
 
@@ -46,7 +46,7 @@ class KnownPrices:
         table = np.full((len(model.need), len(model.count)), np.inf)
         table[model.task_of_pair, model.class_of_pair] = paid
         self._known.append(Prices(table, penalty.copy(), value, least.copy()))
-        del self._known[: -min(MOST_KNOWN, max(1, MOST_CELLS // table.size))]
+        del self._known[: -min(MAX_KNOWN, max(1, MAX_CELLS // table.size))]
 
     def within(
         self, model: EnergyModel, cost: float, task: WholeArray, group: csr_array, used: FloatArray, sets: IntArray

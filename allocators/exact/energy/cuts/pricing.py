@@ -13,7 +13,7 @@ from alloc.allocators.exact.knapsack import WholeArray, order_of
 from alloc.allocators.runtime.compiled import compiled
 from alloc.problems.instance import FloatArray
 
-STEPS, MOST_STEPS, CELLS = 1000, 10_000, 200_000
+STEPS, MAX_STEPS, CELLS = 1000, 10_000, 200_000
 """Minimum and maximum number of steps of a need for non-integer weights, and the target number of table cells."""
 
 
@@ -67,7 +67,7 @@ def cheapest_with_cuts(
     if not exact:
         copies = of_interest(weight, price, copies, need, best - slack)
     item, searched = list_items(weight, price, copies, first_cut, whole)
-    steps = min(MOST_STEPS, max(STEPS, CELLS // (1 + len(item))))
+    steps = min(MAX_STEPS, max(STEPS, CELLS // (1 + len(item))))
     scale = 1.0 if whole else steps * (1 - 1e-9) / need
     least = int(np.floor(need * scale))
     rest = tabulate_rest(weight, price, item, scale, least, max(least, max_weight), exact)

@@ -15,7 +15,7 @@ from alloc.allocators.exact.knapsack import WholeArray
 from alloc.allocators.runtime.compiled import compiled
 from alloc.problems.instance import FloatArray
 
-MOST_WORK = 100_000_000
+MAX_WORK = 100_000_000
 """Limit on the number of visits to groups, some tenths of a second, after which the search ends."""
 
 
@@ -46,7 +46,7 @@ def violated_sets(
     sets, excess = np.empty((most, 3), dtype=np.int64), np.empty(most)
     for a in range(classes):
         others = np.flatnonzero(near[a])
-        if work > MOST_WORK:
+        if work > MAX_WORK:
             break
         work += len(others) ** 2 * len(part) // 2
         for x in range(len(others)):

@@ -10,11 +10,11 @@ from alloc.allocators.runtime.compiled import compiled
 from alloc.allocators.runtime.random import RandomState, draw
 from alloc.problems.instance import FloatArray
 
-MOST_TASKS, WIDE_PERIOD, WIDE_PERIOD_SHORT = 3, 10, 2
+MAX_TASKS, WIDE_PERIOD, WIDE_PERIOD_SHORT = 3, 10, 2
 """Largest number of tasks in a repartition, and one in how many repartitions has that many, in general and if it begins
 with a task with a shortfall; the others have one less."""
 
-MOST_OF_TASK, MOST_IDLE = 10, 6
+MAX_OF_TASK, MAX_IDLE = 10, 6
 """Largest numbers of agents of a task, and of idle agents, in a repartition."""
 
 MAX_NODES = 2000
@@ -68,7 +68,7 @@ def draw_tasks(groups: Groups, short: int, chosen: WholeArray) -> int:
         period = WIDE_PERIOD_SHORT
         while groups.done[chosen[0]] >= 1.0:
             chosen[0] = chosen[0] + 1 if chosen[0] + 1 < m else 0
-    size = MOST_TASKS if draw(random, period) == 0 else MOST_TASKS - 1
+    size = MAX_TASKS if draw(random, period) == 0 else MAX_TASKS - 1
     size = min(size, 1 + groups.near.shape[1])
     while count < size:
         task = groups.near[chosen[draw(random, count)], draw(random, groups.near.shape[1])]
@@ -91,7 +91,7 @@ def draw_pool(groups: Groups, chosen: WholeArray, count: int, pool: WholeArray, 
     for x in range(count + 1):
         group = chosen[x]
         size = groups.size[group]
-        most = min(size, MOST_OF_TASK if x < count else MOST_IDLE)
+        most = min(size, MAX_OF_TASK if x < count else MAX_IDLE)
         member = groups.member[group]
         for y in range(most):
             last = size - 1 - y
@@ -140,8 +140,8 @@ def anneal(
         Penalty of missing work, as a multiple of its price, or of the mean price.
     """
     m, mean, random = len(price), price.mean(), groups.random
-    most = (MOST_TASKS + 1) * max(MOST_OF_TASK, MOST_IDLE)
-    chosen, short = np.empty(MOST_TASKS + 1, dtype=np.int64), 0
+    most = (MAX_TASKS + 1) * max(MAX_OF_TASK, MAX_IDLE)
+    chosen, short = np.empty(MAX_TASKS + 1, dtype=np.int64), 0
     all_agents, options = np.empty(most, dtype=np.int64), np.empty(most, dtype=np.int64)
     for j in range(m):
         short += groups.done[j] < 1.0

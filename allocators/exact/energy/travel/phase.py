@@ -23,7 +23,7 @@ WORTHWHILE = 2e-3
 """Relative gain from which a plan is submitted at the end of a cycle. A submitted plan is slightly faster than
 required, and later plans must be as fast, so that each submission costs some energy."""
 
-PATIENCE, LEAST_SHARE = 1.0, 0.3
+PATIENCE, MIN_SHARE = 1.0, 0.3
 """Time without a better plan, as a multiple of the time until the best was found, after which the search has stalled;
 and lower limit of the latter, as a share of the stage."""
 
@@ -87,7 +87,7 @@ class TravelPhase:
 
     def has_stalled(self, stage_s: float) -> bool:
         """Whether no better plan has been found for long, in a stage of `stage_s` seconds."""
-        took_s = max(self._found_s - self._begin_s, LEAST_SHARE * stage_s)
+        took_s = max(self._found_s - self._begin_s, MIN_SHARE * stage_s)
         return self._search.elapsed_s - self._found_s > PATIENCE * took_s
 
     def _begin_cycle(self) -> None:

@@ -18,7 +18,7 @@ from alloc.allocators.exact.knapsack import WholeArray
 from alloc.allocators.runtime.compiled import compiled
 from alloc.problems.instance import FloatArray
 
-LEAST_GAIN = 1e-9
+MIN_GAIN = 1e-9
 """Smallest gain of a change, in mean flights."""
 
 
@@ -114,7 +114,7 @@ def repartition(
     for j in range(options - 1):
         limit += price_of_work(tasks, j, now[j], now[j])
     before = limit
-    limit -= LEAST_GAIN
+    limit -= MIN_GAIN
     order = np.argsort(second)
     most = most_to_come(weight, option, regret, order, limit)
     paid, branch, taken = np.zeros(agents + 1), np.zeros(agents + 1, dtype=np.int64), np.empty(agents, dtype=np.int64)

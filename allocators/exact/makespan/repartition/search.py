@@ -17,10 +17,10 @@ MAX_PAIRS = 4_000_000
 USUAL_LOSS = 0.05
 """Relative loss of an agent's work, by travel to another task, at which its weight falls to 1/e."""
 
-LEAST_USE, GOOD_USE = 1e-3, 0.02
+MIN_USE, GOOD_USE = 1e-3, 0.02
 """Minimum weight of an agent in the choice of tasks, and weight above which it is of good use."""
 
-LEAST_PRICE = 0.2
+MIN_PRICE = 0.2
 """Smallest price of a need relative to the largest, so that every shortfall counts."""
 
 STEPS = 20
@@ -81,7 +81,7 @@ class RepartitionSearch:
         work = np.ascontiguousarray(weight[:, self._tasks][self._model.classes.class_of_agent])
         need, best, largest, steps = need[self._tasks], self._place, -1.0, 0
         if price is not None:
-            value = np.maximum(price[self._tasks], LEAST_PRICE * price.max())
+            value = np.maximum(price[self._tasks], MIN_PRICE * price.max())
             work, need = work * value, need * value
         partners = partners_of(work, has_travel_time=self._model.travel_time is not None)
         while True:
@@ -104,7 +104,7 @@ def partners_of(work: FloatArray, *, has_travel_time: bool = False) -> Partners:
     use = (work > 0).astype(float)
     if has_travel_time:
         loss = 1 - work / np.maximum(work.max(axis=1, keepdims=True), 1e-300)
-        use *= np.maximum(LEAST_USE, np.exp(-loss / USUAL_LOSS))
+        use *= np.maximum(MIN_USE, np.exp(-loss / USUAL_LOSS))
     common = use.T @ use
     np.fill_diagonal(common, 0.0)
     up_to = np.cumsum(common, axis=1)

@@ -20,13 +20,13 @@ from alloc.problems.text import one_line
 
 Entry = dict[str, object]
 
-MOST_AGENTS = 1000
+MAX_AGENTS = 1000
 """Maximum number of agents on a map; if there are more, an evenly spaced subset is drawn."""
 
-MOST_TASKS = 1000
+MAX_TASKS = 1000
 """Maximum number of tasks on a map; if there are more, those with the largest workloads are drawn."""
 
-MOST_TRACES = 200
+MAX_TRACES = 200
 """Maximum number of runs of an instance whose traces are drawn."""
 
 CHUNK = 200_000
@@ -86,7 +86,7 @@ def details(
 
 
 def _detail(archive: Archive, layout: Layout, number: int, keys: Sequence[str], content: bytes | None) -> Entry:
-    shown = sorted(keys, key=lambda key: (layout.places[key].group, layout.places[key].seed))[:MOST_TRACES]
+    shown = sorted(keys, key=lambda key: (layout.places[key].group, layout.places[key].seed))[:MAX_TRACES]
     found: Entry = {
         "runs": len(keys),
         "groups": sorted({layout.places[key].group for key in keys}),
@@ -123,8 +123,8 @@ def rounded(value: float) -> float:
 def _map(archive: Archive, layout: Layout, instance: Instance, keys: Sequence[str]) -> Entry:
     """Return positions of tasks and agents in integer units, and the plans; without positions if none are known."""
     where = places(instance)
-    begin = [base for base in bases(instance, where, MOST_AGENTS) if len(base.agents)]
-    agents, tasks = _drawn_agents(instance, begin), np.sort(np.argsort(-instance.workload, kind="stable")[:MOST_TASKS])
+    begin = [base for base in bases(instance, where, MAX_AGENTS) if len(base.agents)]
+    agents, tasks = _drawn_agents(instance, begin), np.sort(np.argsort(-instance.workload, kind="stable")[:MAX_TASKS])
     low, unit = _frame(where)
     base_of = {agent: number for number, base in enumerate(begin) for agent in base.agents.tolist()}
     return {
@@ -154,10 +154,10 @@ def _map(archive: Archive, layout: Layout, instance: Instance, keys: Sequence[st
 
 def _drawn_agents(instance: Instance, begin: Sequence[Base]) -> IntArray:
     """Return the agents to draw: all, or a subset with known places if there are many."""
-    if instance.n <= MOST_AGENTS:
+    if instance.n <= MAX_AGENTS:
         return np.arange(instance.n)
     known = np.sort(np.concatenate([base.agents for base in begin])) if begin else np.arange(instance.n)
-    return known[np.unique(np.linspace(0, len(known) - 1, MOST_AGENTS).astype(np.intp))]
+    return known[np.unique(np.linspace(0, len(known) - 1, MAX_AGENTS).astype(np.intp))]
 
 
 def _frame(where: Places) -> tuple[FloatArray, float]:

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from importlib.metadata import version
 from importlib.resources import files
 
-from alloc.allocators.experiments.report.page.details import MOST_TRACES, details, rounded
+from alloc.allocators.experiments.report.page.details import MAX_TRACES, details, rounded
 from alloc.allocators.experiments.report.page.encode import compressed
 from alloc.allocators.experiments.report.page.groups import Layout, laid_out
 from alloc.allocators.experiments.report.page.libraries import libraries, require_packages
@@ -25,7 +25,7 @@ from alloc.problems.text import one_line
 DETAIL_BYTES, DETAIL_BYTES_A_RUN = 1_500_000, 150
 """Maximum size of maps and traces on a page: a constant, and an addition per run."""
 
-MOST_FAILURES = 500
+MAX_FAILURES = 500
 """Maximum number of distinct failures whose tracebacks are on a page, the most frequent first."""
 
 FIGURES = ("makespan", "served_makespan", "lower_bound", "gap", "energy", "runtime_s", "cpu_s", "memory_mb", "unserved")
@@ -120,7 +120,7 @@ def _contents(
         "colours": (*SERIES, GREY),
         "labels": layout.labels,
         "edges_s": EDGES_S,
-        "most_traces": MOST_TRACES,
+        "most_traces": MAX_TRACES,
         "instances": {
             "name": layout.names,
             "agents": [one.agents for one in layout.known],
@@ -171,7 +171,7 @@ def _failures(archive: Archive, layout: Layout) -> tuple[list[Entry], dict[str, 
     }
     same = {key: (group, method, one.outcome, one.reason, one.details) for key, (group, method, one) in kinds.items()}
     count = Counter(same.values())
-    number = {kind: place for place, (kind, _) in enumerate(count.most_common(MOST_FAILURES))}
+    number = {kind: place for place, (kind, _) in enumerate(count.most_common(MAX_FAILURES))}
     first: dict[object, str] = {}
     for key, kind in same.items():
         first.setdefault(kind, key)

@@ -12,10 +12,10 @@ from alloc.allocators.experiments.report.page.summary import Entry, relative_to_
 from alloc.allocators.experiments.statistics import scores
 from alloc.allocators.experiments.store.outcome import Ending
 
-MOST_POINTS = 2000
+MAX_POINTS = 2000
 """Maximum number of points of a scatter plot; if there are more, an evenly spaced subset is drawn."""
 
-MOST_SIZES = 12
+MAX_SIZES = 12
 """Maximum number of distinct numbers of agents; more are grouped into geometrically spaced bins."""
 
 QUARTILES = (0.25, 0.5, 0.75)
@@ -110,7 +110,7 @@ def _tradeoff(group: Group) -> list[Entry]:
     found = []
     for method, times, energies in zip(group.methods, *both, strict=True):
         known = np.flatnonzero(np.isfinite(times) & np.isfinite(energies))
-        kept = known[:: -(-len(known) * len(group.methods) // MOST_POINTS) or 1]
+        kept = known[:: -(-len(known) * len(group.methods) // MAX_POINTS) or 1]
         if len(known):
             found.append(
                 {
@@ -155,11 +155,11 @@ def _measured(runs: Sequence[Sequence[Ending | None]], measure: str) -> NDArray[
 
 def _bins(agents: NDArray[np.float64]) -> NDArray[np.intp]:
     sizes = np.unique(agents)
-    if len(sizes) <= MOST_SIZES:
+    if len(sizes) <= MAX_SIZES:
         return np.searchsorted(sizes, agents)
     low, high = np.log(max(sizes[0], 1.0)), np.log(sizes[-1])
     place = (np.log(np.maximum(agents, 1.0)) - low) / (high - low)
-    return np.asarray(np.floor(place * (MOST_SIZES - 1e-9)), dtype=np.intp)
+    return np.asarray(np.floor(place * (MAX_SIZES - 1e-9)), dtype=np.intp)
 
 
 def _gaps(group: Group) -> list[Entry]:

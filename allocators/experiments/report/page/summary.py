@@ -17,7 +17,7 @@ from alloc.problems.text import counted
 
 Entry = dict[str, object]
 
-MOST_PAIRED = 100_000
+MAX_PAIRED = 100_000
 """Pairs of methods times instances up to which all pairs are compared, as intervals take time."""
 
 NAMED = ("objective", "time_limit_s", "iterations", "target_gap", "threads", "version", "machine")
@@ -124,7 +124,7 @@ def paired(layout: Layout, group: Group, against: str | None = None) -> list[Ent
         The only reference; by default the first reference is the first method that was run.
     """
     number = {layout.labels[method]: method for method in group.methods}
-    every = len(number) * (len(number) - 1) * len(group.instances) <= MOST_PAIRED
+    every = len(number) * (len(number) - 1) * len(group.instances) <= MAX_PAIRED
     references = [against] if against in number else list(number) if every else list(number)[:1]
     found = []
     for score in SCORES if len(number) > 1 else ():

@@ -35,7 +35,7 @@ PLAYS = 6
 WINDOW = 0.35
 """Time after a decision in which costs count, in ideal mission times."""
 
-MOST_DECISIONS = 3000
+MAX_DECISIONS = 3000
 """Maximum number of decisions of a mission used for learning."""
 
 
@@ -107,7 +107,7 @@ class MissionPpo:
         n, m = len(mission.arrays.agents), len(mission.arrays.tasks)
         weights, records = compiled_weights(self.network), []
         for play in range(PLAYS):
-            record = record_for(n, m, MOST_DECISIONS, mission.ideal)
+            record = record_for(n, m, MAX_DECISIONS, mission.ideal)
             buffers = new_buffers(n, m, mission.periods)
             rollout(begun(mission.arrays, seed), buffers, weights, PLAYS * seed + play, record)
             records.append(record)

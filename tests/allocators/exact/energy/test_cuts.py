@@ -112,7 +112,7 @@ def plain_model(tasks: int, classes: int) -> EnergyModel:
 
 def test_groups_and_cuts_are_limited_by_memory(monkeypatch):
     """Tables of groups grow up to their limit; the programme continues with the groups that it has."""
-    monkeypatch.setattr(group_master, "MOST_ENTRIES", 2 * group_master.ROOM * group_master.ROOM_FOR_CUTS)
+    monkeypatch.setattr(group_master, "MAX_ENTRIES", 2 * group_master.ROOM * group_master.ROOM_FOR_CUTS)
     master = group_master.GroupMaster(plain_model(1, 30), np.ones((1, 1), dtype=bool))
     added = 0
     for members in combinations(range(30), 3):
@@ -120,7 +120,7 @@ def test_groups_and_cuts_are_limited_by_memory(monkeypatch):
         group[list(members)] = 1
         added += master.add(group)
     assert added == 2 * group_master.ROOM < 4060
-    assert max(master._use.size, master._used.size) <= group_master.MOST_ENTRIES
+    assert max(master._use.size, master._used.size) <= group_master.MAX_ENTRIES
     assert master.solve(lambda: False)
     assert master.value == pytest.approx(3.0)
     assert not master._has_room(cut=True) or master._used.shape[1] == group_master.ROOM_FOR_CUTS
@@ -241,7 +241,7 @@ def test_bound_with_cuts_reaches_the_least_cost_with_an_integer_mixture():
 def test_longer_searches_for_groups_are_tried_before_cuts_over_classes_are_removed(most, bound, monkeypatch):
     """Searches of one node lose so much that cuts are of no use; they are removed if searches may not be longer."""
     monkeypatch.setattr(cutting_planes, "FIRST_NODES", 1)
-    monkeypatch.setattr(cutting_planes, "MOST_NODES", most)
+    monkeypatch.setattr(cutting_planes, "MAX_NODES", most)
     model, groups = three_for_two()
     cuts = CuttingPlanes(model, np.zeros((0, 2), dtype=bool), np.zeros(4), groups)
     cuts.ascend(50, 5.5)

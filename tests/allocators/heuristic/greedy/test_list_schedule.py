@@ -62,7 +62,7 @@ def test_tree_agrees_with_the_scan(instance: Instance, factor: float) -> None:
         speed=instance.speed * factor,
     )
     assume(instance.has_travel_time or not instance.reach.is_complete)  # else neither is needed
-    with patch("alloc.allocators.heuristic.greedy.list_schedule.MOST_SCANNED", 0):
+    with patch("alloc.allocators.heuristic.greedy.list_schedule.MAX_SCANNED", 0):
         by_tree = greedy(instance)
     assert by_tree == greedy(instance)
 
@@ -121,7 +121,7 @@ def test_standalone_call_agrees_with_a_run() -> None:
 def test_parallel_assignment_is_as_even_as_sequential() -> None:
     """Threads that assign agents in parallel balance tasks about as well as one, and leave no agent out."""
     instance = random_instance(Family(agents=6000, tasks=20, communication_range=0.8), 0)
-    with patch.multiple(list_schedule, LEAST_SHARED=500, MOST_SCANNED=0):
+    with patch.multiple(list_schedule, MIN_SHARED=500, MAX_SCANNED=0):
         plans = [
             greedy(instance, Search(instance, Objective.MAKESPAN, Budget(None), threads=threads))
             for threads in (1, 3, 3)

@@ -7,12 +7,12 @@ from alloc.allocators import Budget, Search, load, solve
 from alloc.allocators.heuristic.greedy.list_schedule import greedy
 from alloc.allocators.heuristic.local_search.improve import HARD
 from alloc.allocators.heuristic.local_search.parameters import LocalSearchParameters
-from alloc.allocators.heuristic.local_search.parts import LEAST_TASKS, RUNS, Parts, Team
+from alloc.allocators.heuristic.local_search.parts import MIN_TASKS, RUNS, Parts, Team
 from alloc.problems import Instance, Objective, evaluate
 from alloc.problems.generate import Family, random_instance
 from alloc.problems.vocabulary import OBJECTIVES
 
-TASKS = 3 * LEAST_TASKS
+TASKS = 3 * MIN_TASKS
 
 
 @pytest.fixture(scope="module")

@@ -6,8 +6,8 @@ import pytest
 from alloc.allocators.heuristic.greedy.list_schedule import greedy
 from alloc.allocators.heuristic.local_search.annealing_state import (
     FALL,
-    LEAST_EXCHANGES,
     LOWEST,
+    MIN_EXCHANGES,
     PATIENCE,
     RISE,
     AnnealingState,
@@ -65,7 +65,7 @@ def test_search_returns_to_its_best_plan(state):
 
 def test_penalty_is_constant_on_a_short_budget(state):
     """If the budget allows few exchanges per agent, nothing adapts."""
-    factor = PenaltyFactor(state, 10**9, LEAST_EXCHANGES - 1)
+    factor = PenaltyFactor(state, 10**9, MIN_EXCHANGES - 1)
     for _ in range(10):
         factor.update(1)
     assert factor.value == 1.0

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from alloc.allocators import Budget
-from alloc.allocators.learned.play.limits import LARGEST, MOST_TASKS, NEAR, PAIRS_PER_SECOND, too_large
+from alloc.allocators.learned.play.limits import LARGEST, MAX_TASKS, NEAR, PAIRS_PER_SECOND, too_large
 from alloc.problems import Instance
 
 
@@ -24,8 +24,8 @@ def sized(agents: int, tasks: int) -> Instance:
         (1 + LARGEST // (NEAR + 1), 100, None, f"more than the {LARGEST // (NEAR + 1)}"),
         (1900, 1900, 8.0, "1900 agents and 1900 tasks may take 9 s"),
         (1900, 1900, 9.0, None),
-        (1, MOST_TASKS, None, None),
-        (1, MOST_TASKS + 1, None, f"more than the {MOST_TASKS}"),
+        (1, MAX_TASKS, None, None),
+        (1, MAX_TASKS + 1, None, f"more than the {MAX_TASKS}"),
     ],
 )
 def test_size_limits_depend_on_time_and_memory(

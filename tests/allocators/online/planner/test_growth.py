@@ -45,7 +45,7 @@ class Steps:
 @pytest.fixture
 def few(monkeypatch):
     """Limit the number of closed entries that are kept."""
-    kept = (register, "MAX_CLOSED"), (policy_runner, "MAX_CLOSED"), (estimate, "MAX_NEWS"), (announced, "MOST_GONE")
+    kept = (register, "MAX_CLOSED"), (policy_runner, "MAX_CLOSED"), (estimate, "MAX_NEWS"), (announced, "MAX_GONE")
     for module, name in kept:
         monkeypatch.setattr(module, name, FEW)
 
@@ -157,8 +157,8 @@ def test_number_of_news_between_plans_is_limited(few):
 
 def test_routes_forgets_closed_tasks(few, monkeypatch):
     """The policy `routes` drops its data on growing tasks and on distances by a table once tasks are closed."""
-    monkeypatch.setattr(describe, "MOST_REMEMBERED", FEW)
-    monkeypatch.setattr(tables, "MOST_WAYS", FEW)
+    monkeypatch.setattr(describe, "MAX_REMEMBERED", FEW)
+    monkeypatch.setattr(tables, "MAX_WAYS", FEW)
     rows = [(f"t{i}", f"t{j}", 1.0) for i in range(3) for j in range(3) if i != j]
     instance = replaced(crew(), distances=DistanceTable.of(rows, ["a0", "a1", "a2"], ["t0", "t1", "t2"]))
     describer = describe.Describer(1e6, 1.0, 0.0)
