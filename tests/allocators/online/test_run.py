@@ -99,10 +99,13 @@ def test_infeasible_orders_are_logged():
 
 def test_no_compilation_within_a_mission():
     """Loading `gappo` compiles its loops for the argument types of missions, so the first decision is in time."""
-    from alloc.allocators.learned.missions import play, talking
+    from alloc.allocators.learned.missions import exploring, messages, play
 
     policy = load_policy("gappo")
-    loops = (play.consider, play.notice, play.centre, play.is_due, talking.is_to_send)
+    loops = (
+        play.score_options_compiled, play.is_due, play.record_change,
+        exploring.record_seen, exploring.centre, messages.should_send,
+    )  # fmt: skip
     before = [list(loop.signatures) for loop in loops]
     result = simulate(random_mission(MissionParameters(agents=3, tasks=4), seed=1), policy).result
     assert result.decisions > 0
