@@ -28,7 +28,7 @@ STOPS = {
 MAX_REASONS = 5
 """Maximum number of unserved tasks for which the reason is given."""
 
-MAX_LOOKED_AT = 1000
+MAX_EXAMINED = 1000
 """Maximum number of unserved tasks for which those are counted that no agent can do."""
 
 LESS = {
@@ -84,7 +84,7 @@ def _shortage(result: "Result") -> str:
     """Return how many tasks are unserved, and how many of them no agent can do."""
     instance, tasks = result.instance, () if result.evaluation is None else result.evaluation.unserved_tasks
     unserved = f"{len(tasks)} of {counted(instance.m, 'task')}"
-    lost = sum(not len(instance.reach.agents_of(task)) for task in tasks) if len(tasks) <= MAX_LOOKED_AT else 0
+    lost = sum(not len(instance.reach.agents_of(task)) for task in tasks) if len(tasks) <= MAX_EXAMINED else 0
     if lost == len(tasks):
         return f"{unserved} cannot be served by any agent"
     nobody = f", {lost} of them by no agent at all" if lost else ""

@@ -8,7 +8,7 @@ from alloc.allocators.contract.tolerance import PROVEN
 from alloc.allocators.result import Result
 from alloc.problems.text import counted, number
 
-FEWEST_DIGITS = 4
+MIN_DIGITS = 4
 """Minimum number of significant digits of a makespan; more are used to distinguish two."""
 
 MAX_NAMES = 3
@@ -95,7 +95,7 @@ def _change(result: Result, now: Result, *, short: bool = False) -> str:
         is_proven = (result.lower_bound or 0.0) >= now.makespan * (1 - PROVEN)
         limits = _range(result, now)
         return f"{then} as before{' (proven)' if is_proven else f' ({limits})' if limits else ''}"
-    digits = max(FEWEST_DIGITS, math.ceil(-math.log10(abs(share))) + 1)
+    digits = max(MIN_DIGITS, math.ceil(-math.log10(abs(share))) + 1)
     instead = "" if short else f" instead of {_time(now, digits)}"
     changes = "; ".join(filter(None, [f"{_percent(share)} %", _range(result, now)]))
     return f"{_time(result, digits)}{instead} ({changes})"
@@ -122,5 +122,5 @@ def _percent(share: float) -> str:
     return f"{100 * share:+.0f}" if abs(share) >= 0.1 else f"{100 * share:+.2g}"
 
 
-def _time(result: Result, digits: int = FEWEST_DIGITS) -> str:
+def _time(result: Result, digits: int = MIN_DIGITS) -> str:
     return f"{number(result.makespan, digits)} {result.instance.units.time}".rstrip()

@@ -21,7 +21,7 @@ RESAMPLES = 9999
 SMALL = 10
 """Number of instances below which the sample is reported as small, as intervals and tests then say little."""
 
-LEAST = 3
+MIN_INSTANCES = 3
 """Minimum number of instances for an interval or a test."""
 
 MAX_DRAWN = 20_000_000
@@ -166,7 +166,7 @@ def interval(values: NDArray[np.float64]) -> tuple[float | None, float | None]:
     """
     from scipy import stats
 
-    if len(values) < LEAST:
+    if len(values) < MIN_INSTANCES:
         return None, None
     if np.ptp(values) == 0:  # all resamples are equal, and BCa is undefined
         return float(values[0]), float(values[0])
@@ -200,7 +200,7 @@ def signed_rank(values: NDArray[np.float64]) -> float | None:
     """
     from scipy import stats
 
-    if len(values) < LEAST:
+    if len(values) < MIN_INSTANCES:
         return None
     differing = values[values != 0]
     if not len(differing):

@@ -13,7 +13,7 @@ SLACK = 0.001
 MIN_SAVING = 0.01
 """Least saving, as a share of the energy, that is reported."""
 
-TIME_SHARE, MAX_S = 0.02, 0.5
+TIME_SHARE, MAX_TIME_S = 0.02, 0.5
 """Time of each search, as a share of the time limit, and its maximum in seconds."""
 
 ITERATIONS = 20
@@ -49,7 +49,7 @@ def _within(search: Search, makespan: float) -> Evaluation:
     limit, enough = search.budget.time_limit_s, search.instance.n
     budget = Budget(None, min(ITERATIONS, enough))
     if limit is not None:
-        budget = Budget(search.elapsed_s + min(MAX_S, TIME_SHARE * limit), enough)
+        budget = Budget(search.elapsed_s + min(MAX_TIME_S, TIME_SHARE * limit), enough)
     part = search.part(search.objective, MakespanTolerance(limit=makespan), budget=budget)
     improve(part)
     assert part.best is not None

@@ -9,7 +9,7 @@ from alloc.allocators.proof.groups import is_tiny, optimum
 from alloc.problems import Instance, Objective, energy_lower_bound, lp_makespan_lower_bound
 from alloc.problems.evaluation import last_equal
 
-SHARE, MAX_S = 0.02, 0.1
+SHARE, MAX_TIME_S = 0.02, 0.1
 """Share of the time limit, and seconds, that a linear programme may take at most before or during the run."""
 
 MAX_AGENTS = 5000
@@ -39,7 +39,7 @@ class EarlyProof:
 
     def __init__(self, search: Search) -> None:
         limit = search.budget.time_limit_s
-        self._seconds = MAX_S if limit is None else min(MAX_S, SHARE * limit)
+        self._seconds = MAX_TIME_S if limit is None else min(MAX_TIME_S, SHARE * limit)
         self._within, self._cost = 0.0, 0.0
         self.hours = self._makespan_bound(search)
         if search.budget.iterations is None:

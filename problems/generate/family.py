@@ -9,7 +9,7 @@ from alloc.problems.vocabulary import Distribution, Sites, Starts
 LARGEST = 1e12
 """Largest value of a parameter."""
 
-MOST = 10_000_000
+MAX_SIZE = 10_000_000
 """Maximum number of agents, and of tasks, of a generated instance."""
 
 Spread = float | tuple[float, float] | None
@@ -85,7 +85,7 @@ class Family:
 
     def __post_init__(self) -> None:
         for name in ("agents", "tasks", "clusters", "depots"):
-            self._set(name, whole(getattr(self, name), name, 1, MOST))
+            self._set(name, whole(getattr(self, name), name, 1, MAX_SIZE))
         for name in ("ability_min", "ability_max", "load", "world_size", "allowed_fraction"):
             self._set(name, real(getattr(self, name), name, 0, LARGEST, above=True))
         if self.ability_max < self.ability_min:

@@ -11,7 +11,7 @@ bids of all agents; those are counted in the last column. Scores are random with
 alone.
 
 `devices`: the same greedy games from the same beginnings to their end, by the network that ships. Loops and torch on
-the CPU, which take as long per game whatever their number, play at most `MAX_HERE` games.
+the CPU, which take as long per game whatever their number, play at most `MAX_GAMES_ON_CPU` games.
 """
 
 import argparse
@@ -40,7 +40,7 @@ AT_ONCE = Rules(TurnRule.SIMULTANEOUS, returning=True)
 SIZES = ((24, 6, 100), (100, 20, 400))
 """Agents, tasks, and total ability."""
 
-INSTANCES, ROUNDS, SECONDS, MAX_HERE = 64, 40, 4.0, 512
+INSTANCES, ROUNDS, SECONDS, MAX_GAMES_ON_CPU = 64, 40, 4.0, 512
 CORES = len(os.sched_getaffinity(0))
 
 Play = Callable[[], tuple[int, int]]
@@ -245,7 +245,7 @@ def devices(counts: Sequence[int]) -> None:
         boards = {"cpu": near, where: near.to(where)}
         count = decisions(network[where], boards[where])
         for name, device, way, threads in ways:
-            if device == "cuda" or games <= MAX_HERE:
+            if device == "cuda" or games <= MAX_GAMES_ON_CPU:
                 spent = seconds(partial(way, network[device], boards[device], threads))
                 print(f"| {games} | {name} | {spent:.3f} | {count / spent:,.0f} |", flush=True)
 

@@ -12,7 +12,7 @@ from alloc.allocators.experiments.report.table import Table
 from alloc.allocators.experiments.standings import best_known, standings
 from alloc.allocators.experiments.statistics import (
     CONFIDENCE,
-    LEAST,
+    MIN_INSTANCES,
     SMALL,
     Difference,
     differences,
@@ -102,8 +102,8 @@ def _difference_table(found: Sequence[Difference]) -> Table:
     if score == "energy":
         notes.append("Energies are at each method's own makespan; less energy at a longer makespan is not better.")
     smallest = min(one.instances for one in found)
-    if smallest < LEAST:
-        notes.append(f"Fewer than {LEAST} instances allow neither interval nor test.")
+    if smallest < MIN_INSTANCES:
+        notes.append(f"Fewer than {MIN_INSTANCES} instances allow neither interval nor test.")
     elif smallest < SMALL:
         notes.append(f"Small sample: {smallest} instances; intervals and tests of fewer than {SMALL} are unreliable.")
     left_out = max(one.left_out for one in found)

@@ -24,7 +24,7 @@ Scratch = tuple[Singles, Singles, Singles, Singles, IntArray]
 ORDER = (known.STRENGTH, known.CHARGE, known.OTHER_X, known.OTHER_Y)
 """Figures of agents by which the order of decisions is determined, largest first."""
 
-MOST = 6
+MAX_PREDICTED = 6
 """Maximum number of neighbours for which an agent decides."""
 
 
@@ -95,7 +95,7 @@ def predict_neighbours(
         if waits[i] and other[known.HEARD, i] >= own[known.HOUR]:
             waits[i] = precedes(other, i, peer.other, 0)
         found += waits[i]
-    decided = min(found, MOST)
+    decided = min(found, MAX_PREDICTED)
     for _ in range(decided):
         first = -1
         for i in range(situation.others[0]):

@@ -12,7 +12,7 @@ PAIRS_PER_SECOND = 40_000
 PLACES = 12
 """Pairs of places, between which there is attention, that take as long as one pair of agent and candidate."""
 
-LARGEST = 3_000_000
+MAX_PAIRS = 3_000_000
 """Number of pairs above which a game takes more than a few gigabytes."""
 
 MAX_TASKS = 4_000
@@ -25,8 +25,8 @@ def too_large(instance: Instance, budget: Budget) -> str | None:
     pairs = n * (min(NEAR, m) + 1)
     if m > MAX_TASKS:
         return f"{m} tasks are more than the {MAX_TASKS} that it has memory for; use local-search"
-    if pairs > LARGEST:
-        return f"{n} agents are more than the {LARGEST // (NEAR + 1)} that it has memory for; use local-search"
+    if pairs > MAX_PAIRS:
+        return f"{n} agents are more than the {MAX_PAIRS // (NEAR + 1)} that it has memory for; use local-search"
     seconds = (pairs + m * m // PLACES) / PAIRS_PER_SECOND
     if budget.time_limit_s is None or seconds <= max(1.0, budget.time_limit_s):
         return None

@@ -4,8 +4,9 @@ import math
 from collections.abc import Collection, Sequence, Set
 from dataclasses import dataclass
 
-MAX_GONE = 200
-"""Smallest number of routes of agents that are no longer known that are kept."""
+SPARE_ROUTES = 200
+"""Number of routes in addition to one per known agent; above twice the sum, those of unknown agents are dropped unless
+an open task belongs to them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,7 +102,7 @@ class Announced:
         hour, patience : float
             As for `taken`.
         """
-        if len(self.routes) <= 2 * (len(known) + MAX_GONE):
+        if len(self.routes) <= 2 * (len(known) + SPARE_ROUTES):
             return
         owners = self._owners(frozenset(), hour, patience)
         needed = {agent for name, (_, _, agent) in owners.items() if name in tasks}

@@ -40,8 +40,8 @@ MAX_ENTRIES = 4
 """Number of agenda entries per agent and task after which the agenda is rebuilt; at most two of them are not void."""
 
 
-MAX_NEWS = 1000
-"""Smallest number of news since the last plan that are kept."""
+KEPT_NEWS = 1000
+"""Number of the latest news since the last plan that are always kept; at most twice as many are."""
 
 
 @dataclass(frozen=True)
@@ -216,8 +216,8 @@ class StateEstimate:
         """Add a piece of news."""
         self.news.append(news)
         self.news_count += 1
-        if len(self.news) > 2 * MAX_NEWS:
-            del self.news[:-MAX_NEWS]  # no plan was made for long, or the policy fails
+        if len(self.news) > 2 * KEPT_NEWS:
+            del self.news[:-KEPT_NEWS]  # no plan was made for long, or the policy fails
 
     def forget(self, count: int) -> None:
         """Forget the first `count` of all news so far."""

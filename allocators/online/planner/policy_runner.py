@@ -9,7 +9,7 @@ from queue import SimpleQueue
 from types import MappingProxyType
 
 from alloc.allocators.online.contract import AgentDecider, Briefing, FleetDecider, Policy, PolicyError
-from alloc.allocators.online.planner.register import MAX_CLOSED
+from alloc.allocators.online.planner.register import KEPT_CLOSED
 from alloc.allocators.online.planner.state import LiveState
 from alloc.problems.missions.simulation.reports import AgentReport, View
 from alloc.problems.missions.simulation.state import STAY, AgentStatus, Order
@@ -169,7 +169,7 @@ class PolicyRunner:
 
     def _forget_deciders(self, count: int) -> None:
         """Drop the deciders of forgotten agents once there are far more deciders than agents."""
-        if len(self._agents) > 2 * (count + MAX_CLOSED):
+        if len(self._agents) > 2 * (count + KEPT_CLOSED):
             known = self._state.all_agents
             self._agents = {name: decider for name, decider in self._agents.items() if name in known}
 

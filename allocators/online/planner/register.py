@@ -8,8 +8,8 @@ from alloc.problems.arguments import shown
 from alloc.problems.errors import InputError, nearest
 from alloc.problems.missions.simulation.state import AgentState, TaskState
 
-MAX_CLOSED = 200
-"""Number of the last closed entries that are kept at least; at most twice as many are."""
+KEPT_CLOSED = 200
+"""Number of the last closed entries that are always kept; at most twice as many are."""
 
 One = TypeVar("One", AgentState, TaskState)
 
@@ -50,7 +50,7 @@ class Register(Generic[One]):
     @property
     def is_full(self) -> bool:
         """Whether there are more closed entries than are kept."""
-        return len(self._over) > 2 * MAX_CLOSED
+        return len(self._over) > 2 * KEPT_CLOSED
 
     def find(self, name: str | None) -> One:
         """Return an entry by its id; raise `InputError` if it is unknown."""
@@ -85,7 +85,7 @@ class Register(Generic[One]):
 
     def forget(self, needed: Collection[str | None] = ()) -> None:
         """Forget the closed entries beyond the limit, oldest first, except needed ones."""
-        for name in [*self._over][: max(0, len(self._over) - MAX_CLOSED)] if self.is_full else ():
+        for name in [*self._over][: max(0, len(self._over) - KEPT_CLOSED)] if self.is_full else ():
             if name not in needed:
                 del self._over[name], self._by_id[name]
 

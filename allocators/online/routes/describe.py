@@ -29,8 +29,8 @@ from alloc.problems.vocabulary import MANHATTAN as MANHATTAN_METRIC
 PRIORITY_OF_NONE = 1e-3
 """Priority assigned to tasks with priority 0, relative to the largest, as they have to be done as well."""
 
-MAX_REMEMBERED = 1000
-"""Tasks of which more is remembered than of those that are open, before what is no longer open is forgotten."""
+SPARE_TASKS = 1000
+"""Number of entries in addition to one per open task; above twice the sum, those of closed tasks are dropped."""
 
 
 @dataclass(frozen=True)
@@ -105,7 +105,7 @@ class Describer:
                 if before < hour and task.left <= left:
                     self._begun.add(name)
                 self._seen[name] = hour, task.left
-        if len(self._begun) + len(self._seen) > 2 * (len(tasks) + MAX_REMEMBERED):
+        if len(self._begun) + len(self._seen) > 2 * (len(tasks) + SPARE_TASKS):
             names = {task.facts.id for task in tasks}
             self._begun &= names
             self._seen = {name: seen for name, seen in self._seen.items() if name in names}

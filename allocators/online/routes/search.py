@@ -34,7 +34,7 @@ WAYS = len(SIZES) + 1
 Plan = tuple[Ints, Ints]
 """Routes and their lengths."""
 
-MAX_OUT, MAX_NEAR, MAX_WAITING, MAX_MEETINGS, BY_TIME = 7, 10, 4, 2, 0.6
+MAX_REMOVED, MAX_NEAR, MAX_WAITING, MAX_MEETINGS, BY_TIME = 7, 10, 4, 2, 0.6
 """Limits on the visits of a removed segment, on unplanned tasks near it and elsewhere that are inserted with them, and
 on tasks for which a coalition is sought; probability of removing by time rather than by distance."""
 
@@ -65,7 +65,7 @@ def _take_out(r: Schedule, nearest: Ints, routes: Ints, lengths: Ints, near: Int
     if lengths[i] == 0:
         return
     p = np.random.randint(lengths[i])
-    seed, most = routes[i, p], 1 + np.random.randint(MAX_OUT)
+    seed, most = routes[i, p], 1 + np.random.randint(MAX_REMOVED)
     by_time = np.random.random() < BY_TIME
     begin, end = r.arrive[i, p], r.arrive[i, min(p + most, lengths[i]) - 1]
     share = 1.0 if np.random.random() < 0.5 else 0.3

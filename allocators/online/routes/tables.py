@@ -12,8 +12,8 @@ from alloc.problems.vocabulary import GEOGRAPHIC, MANHATTAN
 NEAR = 24
 """Number of nearest tasks kept for each task."""
 
-MAX_WAYS = 10_000
-"""Distances between tasks of which more are kept than of those that are there, before all are looked up anew."""
+SPARE_DISTANCES = 10_000
+"""Number of distances in addition to those between the present tasks; above four times the sum, all are looked up anew."""
 
 
 def positions(places: list[Place]) -> Floats:
@@ -77,7 +77,7 @@ class TaskTables:
 
     def _between(self, view: View, tasks: list[TaskReport]) -> Floats:
         table = np.zeros((len(tasks), len(tasks)))
-        if len(self._ways) > 4 * (table.size + MAX_WAYS):
+        if len(self._ways) > 4 * (table.size + SPARE_DISTANCES):
             self._ways.clear()  # drops distances of tasks closed long ago
         for i, one in enumerate(tasks):
             for j, other in enumerate(tasks):

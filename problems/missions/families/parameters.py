@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from alloc.problems.arguments import choice, real, whole
 from alloc.problems.vocabulary import Knowledge, MissionFamily
 
-MOST = 1_000_000
+MAX_SIZE = 1_000_000
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class MissionParameters:
         object.__setattr__(self, "knowledge", choice(Knowledge, self.knowledge, "knowledge"))
         for name in ("agents", "tasks"):
             if getattr(self, name) is not None:
-                object.__setattr__(self, name, whole(getattr(self, name), name, 1, MOST))
+                object.__setattr__(self, name, whole(getattr(self, name), name, 1, MAX_SIZE))
         for name in ("radius", "sensing"):
             if getattr(self, name) != math.inf:
                 real(getattr(self, name), name)

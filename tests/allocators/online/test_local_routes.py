@@ -88,7 +88,7 @@ def test_only_routes_that_reserve_open_tasks_for_unknown_agents_are_kept(monkeyp
     known = announced(**routes)
     known.forget({"a4"}, {"t1", "t2"}, 3.0, 1.0)
     assert known.routes == routes
-    monkeypatch.setattr(announced_routes, "MAX_GONE", 0)
+    monkeypatch.setattr(announced_routes, "SPARE_ROUTES", 0)
     taken = known.taken({"a4"}, 3.0, 1.0)
     known.forget({"a4"}, {"t1", "t2"}, 3.0, 1.0)
     assert known.routes == {"a1": EARLY, "a2": LATE, "a4": routes["a4"]}

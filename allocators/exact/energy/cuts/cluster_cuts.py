@@ -29,7 +29,7 @@ MAX_ROUNDS, MUCH_MORE = 40, 1.1
 TURN, MAX_CUTS = 60, 40
 """Limits on clusters that are separated, and on cuts found, before the mixture is updated."""
 
-WHOLE, MAX_BROKEN = 1e-6, 30
+WHOLE, MAX_FRACTIONAL = 1e-6, 30
 """Distance from an integer from which agents count as fractional, and number of fractional classes above which a
 cluster is skipped."""
 
@@ -104,7 +104,7 @@ class ClusterSeparation:
         self._turn += 1
         pausing = np.array([self._due.get(inside.tobytes(), 0) > self._turn for inside in member], dtype=bool)
         order, tried = np.lexsort((broken, pausing)), 0
-        for f in order[(broken[order] > 0) & (broken[order] <= MAX_BROKEN)].tolist():
+        for f in order[(broken[order] > 0) & (broken[order] <= MAX_FRACTIONAL)].tolist():
             if should_stop() or len(cuts) >= MAX_CUTS or (cuts and (tried >= TURN or pausing[f])):
                 break
             if self._knapsack(member[f]).need[0] > 0:

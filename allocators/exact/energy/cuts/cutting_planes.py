@@ -37,7 +37,7 @@ FIRST_NODES, MORE_NODES, MAX_NODES = 20_000, 4, 4_000_000
 """Limit on the nodes of the search for one group at first, its growth factor, and the limit on all searches of a round,
 less than a second."""
 
-MAX_LOST = 0.1
+MAX_LOSS = 0.1
 """Share of the gap to the plan that truncated searches for groups may cost. Beyond it, longer searches are allowed; if
 even the longest ones lose as much, cuts over classes, which slow them down, are removed."""
 
@@ -161,7 +161,7 @@ class CuttingPlanes:
         price = smoothing * self._price + (1 - smoothing) * master.price
         penalty = smoothing * known + (1 - smoothing) * master.penalty
         value, group, least = self._relax(price, penalty)
-        if self._lost(group, least, price, penalty) > MAX_LOST * max(0.0, cost - max(self.bound, value)):
+        if self._lost(group, least, price, penalty) > MAX_LOSS * max(0.0, cost - max(self.bound, value)):
             if MORE_NODES * self._nodes * len(self._need) <= MAX_NODES:
                 self._nodes *= MORE_NODES
                 return

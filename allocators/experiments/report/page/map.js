@@ -1,7 +1,7 @@
 "use strict";
 // The map of an instance with one plan: moves from starts to tasks, sites by workload and completion time; with zoom.
 
-const MOST_LABELS = 40;
+const MAX_LABELS = 40;
 const above = "-sqrt(datum.size / PI) - 7"; // a label, over the circle of its task
 
 // places in their own units, groups of agents, and moves that begin and end together
@@ -92,7 +92,7 @@ function mapLabels(sites, domain, width, height) {
   const pixel = (value, [low, high], size) => ((value - low) / (high - low)) * size;
   for (const site of [...sites].sort((a, b) => b.size - a.size)) {
     const [x, y, half] = [pixel(site.x, domain.x, width), pixel(site.y, domain.y, height), 3.2 * Math.min(site.task.length, 20) + 3];
-    if (x < half || y < 0 || x > width - half || y > height - 18 || taken.length >= MOST_LABELS) continue;
+    if (x < half || y < 0 || x > width - half || y > height - 18 || taken.length >= MAX_LABELS) continue;
     if (taken.some((one) => Math.abs(one.px - x) < one.half + half && Math.abs(one.py - y) < 15)) continue;
     const text = site.task.length > 20 ? `${site.task.slice(0, 19)}…` : site.task;
     taken.push({ x: site.x, y: site.y, size: site.size, task: text, px: x, py: y, half });

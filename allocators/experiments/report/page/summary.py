@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from alloc.allocators.experiments.report.page.groups import Group, Layout
-from alloc.allocators.experiments.statistics import LEAST, SMALL, differences, scores
+from alloc.allocators.experiments.statistics import MIN_INSTANCES, SMALL, differences, scores
 from alloc.allocators.experiments.store.outcome import Ending, Outcome
 from alloc.allocators.experiments.store.store import CONDITIONS
 from alloc.allocators.experiments.stored import Endings, doubts
@@ -149,7 +149,7 @@ def notes(group: Group) -> list[str]:
         share = f"{common} of {counted(every, 'instance')}"
         found.append(f"Profiles and curves over time are based on the {share} on which every method was run.")
     if len(group.endings) > 1 and common and common < SMALL:
-        least = f"; fewer than {LEAST} allow neither interval nor test" if common < LEAST else ""
+        least = f"; fewer than {MIN_INSTANCES} allow neither interval nor test" if common < MIN_INSTANCES else ""
         found.append(f"Small sample: {counted(common, 'instance')} in common{least}.")
     found += _about_means(group)
     ended = _flat(group.endings)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from alloc.allocators import Budget
-from alloc.allocators.learned.play.limits import LARGEST, MAX_TASKS, NEAR, PAIRS_PER_SECOND, too_large
+from alloc.allocators.learned.play.limits import MAX_PAIRS, MAX_TASKS, NEAR, PAIRS_PER_SECOND, too_large
 from alloc.problems import Instance
 
 
@@ -21,7 +21,7 @@ def sized(agents: int, tasks: int) -> Instance:
         (3 * PAIRS_PER_SECOND, 1, 5.0, "may take 6 s"),
         (3 * PAIRS_PER_SECOND, 1, 6.0, None),
         (3 * PAIRS_PER_SECOND, 1, None, None),
-        (1 + LARGEST // (NEAR + 1), 100, None, f"more than the {LARGEST // (NEAR + 1)}"),
+        (1 + MAX_PAIRS // (NEAR + 1), 100, None, f"more than the {MAX_PAIRS // (NEAR + 1)}"),
         (1900, 1900, 8.0, "1900 agents and 1900 tasks may take 9 s"),
         (1900, 1900, 9.0, None),
         (1, MAX_TASKS, None, None),

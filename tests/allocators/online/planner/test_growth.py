@@ -45,7 +45,12 @@ class Steps:
 @pytest.fixture
 def few(monkeypatch):
     """Limit the number of closed entries that are kept."""
-    kept = (register, "MAX_CLOSED"), (policy_runner, "MAX_CLOSED"), (estimate, "MAX_NEWS"), (announced, "MAX_GONE")
+    kept = (
+        (register, "KEPT_CLOSED"),
+        (policy_runner, "KEPT_CLOSED"),
+        (estimate, "KEPT_NEWS"),
+        (announced, "SPARE_ROUTES"),
+    )
     for module, name in kept:
         monkeypatch.setattr(module, name, FEW)
 
@@ -157,8 +162,8 @@ def test_number_of_news_between_plans_is_limited(few):
 
 def test_routes_forgets_closed_tasks(few, monkeypatch):
     """The policy `routes` drops its data on growing tasks and on distances by a table once tasks are closed."""
-    monkeypatch.setattr(describe, "MAX_REMEMBERED", FEW)
-    monkeypatch.setattr(tables, "MAX_WAYS", FEW)
+    monkeypatch.setattr(describe, "SPARE_TASKS", FEW)
+    monkeypatch.setattr(tables, "SPARE_DISTANCES", FEW)
     rows = [(f"t{i}", f"t{j}", 1.0) for i in range(3) for j in range(3) if i != j]
     instance = replaced(crew(), distances=DistanceTable.of(rows, ["a0", "a1", "a2"], ["t0", "t1", "t2"]))
     describer = describe.Describer(1e6, 1.0, 0.0)
