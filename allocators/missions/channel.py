@@ -129,14 +129,14 @@ def find_near(state: MissionArrays, number: int, limit: float, end: int, near: N
 
     The radius is also given as `limit`, by `limit_of`.
     """
-    head, here, room = state.head[0], place_of(state.agents[number], state.head[0].hour), (state.is_near, state.near)
+    head, here, output = state.head[0], place_of(state.agents[number], state.head[0].hour), (state.is_near, state.near)
     cells = state.speaker_cells
     first, last, low, high = cells_near(head, here[0], here[1], head.radius + TOLERANCE)
     for row in range(low, high + 1):
         begin, until = cells[row * head.columns + first], cells[row * head.columns + last + 1]
         if begin == until:
             continue
-        for place in range(find_within(head.is_manhattan, limit, here, state.speaker_places, begin, until, room)):
+        for place in range(find_within(head.is_manhattan, limit, here, state.speaker_places, begin, until, output)):
             other = state.speakers[state.near[place]]
             is_heard = other != number
             if head.loss > 0:

@@ -114,7 +114,7 @@ def limit_of(is_manhattan: int, reach: float) -> float:
 
 @inlined
 def find_within(
-    is_manhattan: int, limit: float, to: Point, places: FloatArray, begin: int, end: int, room: Found
+    is_manhattan: int, limit: float, to: Point, places: FloatArray, begin: int, end: int, output: Found
 ) -> int:
     """Find the places that are within reach of a point, or unknown; return their number.
 
@@ -127,10 +127,10 @@ def find_within(
     places : ndarray, shape (3, places)
     begin, end : int
         Range of the places to examine.
-    room : Found
-        Output: the indices of the places found.
+    output : Found
+        A workspace, and the indices of the places found.
     """
-    is_near, near = room
+    is_near, near = output
     at_x, at_y, at_z = places[0, begin:end], places[1, begin:end], places[2, begin:end]
     x, y, z = to
     for place in range(end - begin):  # from 0, so that the loop is vectorised

@@ -74,7 +74,7 @@ def seen_of(head: Head, agents: Sequence[Agent], task: Task, number: int) -> flo
 @inlined
 def see_agents(state: MissionArrays, number: int, here: Point, limit: float, is_located: bool) -> None:
     """Update an agent's knowledge of the agents that it senses; `is_located` if the grid has their present places."""
-    head, room = state.head[0], (state.is_near, state.near)
+    head, output = state.head[0], (state.is_near, state.near)
     reach, reach_limit, is_manhattan = head.sensing + TOLERANCE, limit, head.is_manhattan
     if not is_located:
         reach = (reach + drift(head)) * (1 + SLACK)
@@ -82,7 +82,7 @@ def see_agents(state: MissionArrays, number: int, here: Point, limit: float, is_
     first, last, low, high = cells_near(head, here[0], here[1], reach)
     for row in range(low, high + 1):
         begin, end = state.cells[row * head.columns + first], state.cells[row * head.columns + last + 1]
-        for place in range(find_within(is_manhattan, reach_limit, here, state.places, begin, end, room)):
+        for place in range(find_within(is_manhattan, reach_limit, here, state.places, begin, end, output)):
             other = state.in_cells[state.near[place]]
             agent = state.agents[other]
             if not IDLE <= agent.status <= WORKING:

@@ -106,17 +106,17 @@ def simulate_until(
     if isinstance(policy, Policy) and (settings or parameters is not None):
         raise InputError("is an object with its own parameters; set them when you create it", "policy")
     require_knowledge(describe_policy(policy) if isinstance(policy, str) else policy.info, known)
-    leader = load_policy(policy, parameters, **settings) if isinstance(policy, str) else policy
+    chosen = load_policy(policy, parameters, **settings) if isinstance(policy, str) else policy
     simulation = Simulation(mission, known, number)
     if observe is not None:
         observe(simulation)
-    control = _Control(leader, simulation, number, deadline_s)
+    control = _Control(chosen, simulation, number, deadline_s)
     while (request := simulation.advance()) is not None:
         if should_stop():
             return None
         control.answer(request)
     times = DecisionTimes.of(control.seconds, control.late, time.perf_counter() - began)
-    result = measured(simulation, leader.info.name, number, times)
+    result = measured(simulation, chosen.info.name, number, times)
     return MissionRun(result, log_of(simulation, result))
 
 
@@ -175,7 +175,7 @@ class _Control:
             for name in () if self._fleet is not None else request.agents:
                 self._send(name)
         elif self._fleet is not None:
-            self._lead(self._fleet, request)
+            self._order_fleet(self._fleet, request)
         else:
             for name in request.agents:
                 self._order(name)
@@ -188,7 +188,7 @@ class _Control:
             raise PolicyError(f"policy {self._name!r} sent {message!r} as a message of {name!r}")
         self._simulation.send(name, message)
 
-    def _lead(self, fleet: FleetDecider, request: Request) -> None:
+    def _order_fleet(self, fleet: FleetDecider, request: Request) -> None:
         view = self._simulation.view(None)
         began = time.perf_counter()
         orders = fleet.decide(view)

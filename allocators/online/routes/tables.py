@@ -13,7 +13,7 @@ NEAR = 24
 """Number of nearest tasks kept for each task."""
 
 SPARE_DISTANCES = 10_000
-"""Number of distances in addition to those between the present tasks; above four times the sum, all are looked up anew."""
+"""Number of distances in addition to those between the present tasks; above four times the sum, all are dropped."""
 
 
 def positions(places: list[Place]) -> Floats:

@@ -77,14 +77,14 @@ def _at_once(missions: "list[Mission]", runs: MissionRuns, units: "Units") -> _F
     from alloc.allocators.experiments.policies import compare_policies
     from alloc.allocators.runtime.interrupts import signals_set
 
-    leaders = {
+    loaded = {
         label: name if settings is None else load_policy(name, **settings)
         for label, (name, settings) in runs.policies.items()
     }
-    stop, rows, total = threading.Event(), list["PolicyRow"](), len(missions) * len(leaders)
+    stop, rows, total = threading.Event(), list["PolicyRow"](), len(missions) * len(loaded)
     with signals_set(stop):
         for row in compare_policies(
-            missions, leaders, runs.seeds, knowledge=runs.knowledge, deadline_ms=runs.deadline_ms, stop=stop
+            missions, loaded, runs.seeds, knowledge=runs.knowledge, deadline_ms=runs.deadline_ms, stop=stop
         ):
             rows.append(row)
             show_done(f"{row.mission}, {row.policy}: {_outcome(row, units)}", len(rows), total)

@@ -80,10 +80,12 @@ def simulate_command(
     if log == STANDARD and json:
         raise typer.BadParameter("cannot go to standard output together with --json", param_hint="'--log'")
     problem = read_mission(mission)
-    leader = load(policy, settings, knowledge or problem.knowledge)
+    loaded = load(policy, settings, knowledge or problem.knowledge)
     recorder = Recorder(with_knowledge=animate is not None) if plot or animate else None
-    lead = partial(simulate, problem, leader, knowledge=knowledge, deadline_ms=deadline_ms or None, observe=recorder)
-    results, last = until_interrupted(lead, range(seed, seed + runs))
+    run_once = partial(
+        simulate, problem, loaded, knowledge=knowledge, deadline_ms=deadline_ms or None, observe=recorder
+    )
+    results, last = until_interrupted(run_once, range(seed, seed + runs))
 
     def figures() -> str:
         return to_json(results[0].to_dict() if runs == 1 else [result.to_dict() for result in results])
@@ -96,7 +98,7 @@ def simulate_command(
 
 
 def until_interrupted(
-    lead: "Callable[..., MissionRun]", seeds: Sequence[int]
+    run_once: "Callable[..., MissionRun]", seeds: Sequence[int]
 ) -> "tuple[list[MissionResult], MissionLog]":
     """Make a run with each seed, and return the results and the log of the last one.
 
@@ -108,7 +110,7 @@ def until_interrupted(
     try:
         with sigterm_interrupts():
             for seed in seeds:
-                run = lead(seed=seed)
+                run = run_once(seed=seed)
                 results.append(run.result)
     except KeyboardInterrupt:
         if not results:
