@@ -1,4 +1,4 @@
-"""Documents held against the schemas of their formats; what a schema does not describe is a fault, too."""
+"""Validation of documents by the schemas of their formats; what a schema does not describe is an error, too."""
 
 import json
 from functools import cache

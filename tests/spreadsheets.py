@@ -1,4 +1,4 @@
-"""Spreadsheets as people write them, with what must come of each: an instance, or one line that says what to mend."""
+"""Realistic spreadsheets with the expected result of each: an instance, or one line that says what to correct."""
 
 import io
 from dataclasses import dataclass, field

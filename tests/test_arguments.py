@@ -1,4 +1,4 @@
-"""Whatever is wrong with an argument is told at the public door, by the name of its parameter."""
+"""Public functions report invalid arguments by the name of the parameter."""
 
 import json
 import pickle

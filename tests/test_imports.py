@@ -1,4 +1,4 @@
-"""What an import loads."""
+"""Modules that an import loads."""
 
 import subprocess
 import sys

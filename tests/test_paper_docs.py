@@ -1,4 +1,4 @@
-"""What the documents say of the code is there: every `path:name`, and a word on every part of the paper."""
+"""Every `path:name` in the documents exists, and every part of the paper is discussed."""
 
 import ast
 import re

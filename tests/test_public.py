@@ -1,4 +1,4 @@
-"""What `from alloc.problems import ...` and `from alloc.allocators import ...` give: documented, typed, and no more."""
+"""Public names of `alloc.problems` and `alloc.allocators`: documented, typed, and no others."""
 
 import inspect
 import subprocess

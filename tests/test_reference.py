@@ -1,4 +1,4 @@
-"""docs/reference/ is what its script makes of the docstrings, and has a page for every public name."""
+"""docs/reference/ matches the docstrings, and has a page for every public name."""
 
 import importlib.util
 import re

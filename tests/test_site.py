@@ -1,4 +1,4 @@
-"""The site of the documents: all pages are in it, links lead somewhere there, and nothing is loaded from elsewhere."""
+"""The site of the documents: it has all pages, links have targets in it, and nothing is loaded from other hosts."""
 
 import importlib.util
 import json

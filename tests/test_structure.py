@@ -1,4 +1,4 @@
-"""The shape of the code: sizes of folders, files and functions, open types, and the words that are used."""
+"""The structure of the code: sizes of folders, files and functions, open types, and terms."""
 
 import ast
 import re

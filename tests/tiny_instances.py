@@ -1,4 +1,4 @@
-"""Random instances small enough for brute force, over everything that an instance can have."""
+"""Random instances small enough for brute force, with all fields of an instance."""
 
 from collections.abc import Callable, Collection
 from itertools import count, islice

@@ -1,4 +1,4 @@
-"""The suite fails allocators that break the contract: one defect at a time, in an allocator that else passes."""
+"""The suite fails allocators that break the contract: one defect at a time, in an allocator that otherwise passes."""
 
 import os
 import random

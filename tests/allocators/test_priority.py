@@ -1,4 +1,4 @@
-"""Where not all tasks can be served, the most urgent are, by every method; brute force as oracle."""
+"""If not all tasks can be served, every method serves the most urgent ones, compared with brute force."""
 
 from itertools import pairwise
 

@@ -1,4 +1,4 @@
-"""The program ends, or gets Ctrl-C, while another of its threads solves: nothing crashes, and no answer is lost."""
+"""The program ends, or gets Ctrl-C, while another thread solves: it does not crash, and no answer is lost."""
 
 import signal
 import subprocess

@@ -1,4 +1,4 @@
-"""Re-planning: a price on moves, pinned agents, and plans for another state of affairs, against brute force."""
+"""Re-planning: a price on moves, pinned agents, and plans for other fleets, compared with brute force."""
 
 from functools import cache
 from itertools import product

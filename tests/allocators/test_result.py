@@ -1,4 +1,4 @@
-"""What is derived from scores and bounds, the format, and reading it back."""
+"""Results: derived figures, their format, and reading it."""
 
 import json
 import sys

@@ -1,4 +1,4 @@
-"""Instances too large for most methods: who refuses does so at once, and the rest build no table of all pairs."""
+"""Instances too large for most methods: these refuse at once, and the others build no table of all pairs."""
 
 import time
 from collections.abc import Iterator

@@ -1,4 +1,4 @@
-"""More tasks than agents can serve: every method serves the right ones, and says what is proven."""
+"""More tasks than agents can serve: every method serves the right ones, and reports what is proven."""
 
 from functools import cache
 

@@ -1,4 +1,4 @@
-"""The recipe around every method."""
+"""`solve`: what is done before and after every method."""
 
 import threading
 from dataclasses import replace

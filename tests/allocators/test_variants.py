@@ -1,4 +1,4 @@
-"""Metrics, distances of one's own, energy of each agent, flights back and skills: every method against brute force."""
+"""Every method compared with brute force: metrics, custom distances, energy per agent, return flights and skills."""
 
 from functools import cache
 

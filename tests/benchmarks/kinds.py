@@ -1,4 +1,4 @@
-"""Instances as people have them, by kind and seed: ranges, batteries, lists, speeds, and abilities of all sorts."""
+"""Realistic instances by kind and seed: ranges, batteries, lists, speeds, and abilities of several kinds."""
 
 from collections.abc import Callable
 

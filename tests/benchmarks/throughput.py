@@ -1,4 +1,4 @@
-"""Agent decisions per second: of the ways to play the game, or of compiled loops, torch, and a GPU if there is one.
+"""Agent decisions per second: of each way to play the game, or of compiled loops, torch, and a GPU if present.
 
     python tests/benchmarks/throughput.py ways
     python tests/benchmarks/throughput.py devices --games 64 512 4096

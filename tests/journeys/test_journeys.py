@@ -1,4 +1,4 @@
-"""What people come for, by the documents alone: a folder for each, with a script and what must come out."""
+"""User journeys by the documents alone: a folder for each, with a script and its expected output."""
 
 import io
 import os

@@ -83,7 +83,7 @@ def test_holm_multiplies_by_the_remaining_hypotheses():
 
 
 def test_intervals_have_their_nominal_coverage(monkeypatch):
-    """About 95 % of intervals from thirty skewed values contain the true mean, more than of normal intervals."""
+    """About 95 % of intervals from thirty skewed values contain the true mean."""
     monkeypatch.setattr(statistics, "RESAMPLES", 999)
     rng = np.random.default_rng(7)
     found = [interval(rng.lognormal(size=30)) for _ in range(100)]

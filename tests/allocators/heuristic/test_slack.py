@@ -1,4 +1,4 @@
-"""What a thousandth more time would save: told where it saves, and only then."""
+"""The note on what 0.1 % more time would save appears only if it saves something."""
 
 import re
 

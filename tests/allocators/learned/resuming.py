@@ -1,4 +1,4 @@
-"""What holds for every learner: the result of a training job depends on state and job alone."""
+"""Tests of every learner: the result of a training job depends only on the state and the job."""
 
 import io
 from collections.abc import Callable

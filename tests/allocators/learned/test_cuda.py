@@ -1,4 +1,4 @@
-"""On a GPU: the scores and the greedy games of the CPU, and plans that repeat; skipped where there is none."""
+"""On a GPU: scores and greedy games match those on the CPU, and plans are reproducible; skipped without a GPU."""
 
 from collections.abc import Iterator
 

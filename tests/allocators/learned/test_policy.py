@@ -1,4 +1,4 @@
-"""Policies as shipped: what they promise on instances and sizes that training never saw."""
+"""The shipped policies on instances and sizes that were not in training."""
 
 import subprocess
 import sys

@@ -1,4 +1,4 @@
-"""The probe games themselves, and that the methods by PPO solve them; the others do so beside their own tests."""
+"""The probe games, and that methods based on PPO solve them; the others are tested with their algorithms."""
 
 import pytest
 import torch

@@ -85,7 +85,7 @@ def test_search_finds_the_optimum(family, seed):
 
 @pytest.mark.parametrize(("agents", "most"), [(20, 35), (40, 10)])
 def test_initial_plans_meet_most_deadlines(agents, most):
-    """A first plan does most tasks in time before any search; with the cheapest put in first, 61 and 19 are undone."""
+    """A first plan does most tasks in time before any search; inserted by least cost, 61 and 19 are undone."""
     known = described(random_cfstp(agents, 300, 1))
     routes, lengths, _ = improved(known, {}, 0, 0, None)
     schedule = worth(known, [route[:count].tolist() for route, count in zip(routes, lengths, strict=True)])[1]

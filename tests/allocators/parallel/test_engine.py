@@ -1,4 +1,4 @@
-"""Engines: the same results in the same order whatever dies, and nothing left behind."""
+"""Engines: the same results in the same order if processes die, and no processes left over."""
 
 import os
 import signal

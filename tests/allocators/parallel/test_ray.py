@@ -1,4 +1,4 @@
-"""The Ray engine: a machine of the cluster dies in mid-work, also of a whole training, and nothing is lost."""
+"""The Ray engine: nothing is lost if a machine of the cluster dies during work, also during a training."""
 
 import contextlib
 import csv

@@ -1,4 +1,4 @@
-"""The page with the map: what it holds, and what a browser makes of it."""
+"""The page with the map: its contents, and its rendering in a browser."""
 
 import json
 import re

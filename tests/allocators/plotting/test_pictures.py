@@ -1,4 +1,4 @@
-"""Every kind of picture looks as it did when somebody looked at it: compared with small ones that are kept here.
+"""Every kind of picture matches a small reference picture that was inspected.
 
 Where a picture is meant to change, the failure names the new one, reduced. Look at it, and then put it in the place of
 the old one.

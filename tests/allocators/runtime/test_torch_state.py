@@ -1,4 +1,4 @@
-"""Torch as others have set it: by the caller around a run, and by whoever else is in the process."""
+"""Settings of torch by the caller, and by other code in the process, are respected."""
 
 import threading
 from collections.abc import Callable

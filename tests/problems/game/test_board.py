@@ -1,4 +1,4 @@
-"""How instances are laid out as games."""
+"""Instances as boards of games."""
 
 import warnings
 

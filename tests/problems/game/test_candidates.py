@@ -1,4 +1,4 @@
-"""Which tasks agents bid for."""
+"""Candidate tasks of agents."""
 
 import numpy as np
 import pytest

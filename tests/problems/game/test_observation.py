@@ -1,4 +1,4 @@
-"""What agents see."""
+"""Observations of agents."""
 
 from dataclasses import replace
 

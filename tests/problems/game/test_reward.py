@@ -1,4 +1,4 @@
-"""Rewards, with numbers worked by hand and against brute force."""
+"""Rewards, compared with hand calculation and brute force."""
 
 import itertools
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""How the game goes, with numbers worked by hand."""
+"""The rules of the game, compared with hand calculation."""
 
 import numpy as np
 import pytest

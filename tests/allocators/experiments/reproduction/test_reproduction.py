@@ -1,4 +1,4 @@
-"""The paper's experiments made anew: rows that outlive crashes, and a page that is made from them alone."""
+"""Reproduction of the paper's experiments: rows survive crashes, and the page is generated only from them."""
 
 import math
 import os

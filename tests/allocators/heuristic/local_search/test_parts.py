@@ -1,4 +1,4 @@
-"""Local search by several threads: a plan annealed in parts, and attempts side by side."""
+"""Local search with several threads: a plan annealed in parts, and parallel attempts."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""A2C: its returns against the definition, its gradient against numbers, and probe games with known answers."""
+"""A2C: returns match the definition and gradients hand calculation, and probe games are solved."""
 
 import pytest
 import torch

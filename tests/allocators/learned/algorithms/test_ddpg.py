@@ -1,4 +1,4 @@
-"""DDPG: the relaxation and its gradient (18) against finite differences, and probe games with known answers."""
+"""DDPG: the relaxation and its gradient (18) match finite differences, and probe games are solved."""
 
 import pytest
 import torch

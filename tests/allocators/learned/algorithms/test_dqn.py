@@ -1,4 +1,4 @@
-"""DQN: its targets against numbers worked by hand, its target network, and probe games with known answers."""
+"""DQN: targets match hand calculation, the target network is updated, and probe games are solved."""
 
 import pytest
 import torch

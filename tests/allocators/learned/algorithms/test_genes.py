@@ -1,4 +1,4 @@
-"""Members that share one network: what a gene adds, whose turn it is, and how genes are bred."""
+"""Populations in one network: what a gene adds, the order of members, and breeding of genes."""
 
 import copy
 

@@ -1,4 +1,4 @@
-"""Hyperparameters out of range are told when they are set, wherever they come from."""
+"""Hyperparameters out of range are reported when they are set, whatever their source."""
 
 import math
 import subprocess

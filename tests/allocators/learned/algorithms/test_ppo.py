@@ -1,4 +1,4 @@
-"""PPO: its formulas against numbers worked by hand, and its step against the loss written out.
+"""PPO: formulas match hand calculation, and gradient steps the loss written out.
 
 That it learns what has a known answer is shown in `test_probes`.
 """

@@ -1,4 +1,4 @@
-"""The replay buffer: what it holds, what it forgets, and that it can be stored."""
+"""The replay buffer: its contents, dropped trajectories, and storing."""
 
 import io
 

@@ -1,4 +1,4 @@
-"""Members of a population that have a network each: whose turn it is, what they share, and how they are bred."""
+"""Populations with one network per member: the order of members, shared weights, and breeding."""
 
 import copy
 

@@ -1,4 +1,4 @@
-"""Files of a training: a run that goes on overwrites its own policy, and no other file."""
+"""Files of a training: a resumed run overwrites its own policy, and no other file."""
 
 from pathlib import Path
 

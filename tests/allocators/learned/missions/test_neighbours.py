@@ -1,4 +1,4 @@
-"""What an agent of `gappo` expects of free neighbours."""
+"""Predictions of the choices of free neighbours by an agent of `gappo`."""
 
 from pathlib import Path
 

@@ -22,6 +22,6 @@ def test_numbers_are_squashed_alike_with_and_without_the_table(count: int) -> No
 
 
 def test_infinite_amounts_are_squashed_to_one() -> None:
-    """A task that nobody does takes for ever, which is 1."""
+    """A task without agents is never completed, which is 1."""
     assert squashed(np.inf, 0.5) == 1.0
     assert squashed(0.0, 0.5) == 0.0

@@ -1,4 +1,4 @@
-"""The body that all methods share: it knows no order of agents or tasks, and any number of them."""
+"""The network of all methods: it is invariant to the order of agents and tasks, and takes any number of them."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""From scores to moves: probabilities against plain Python, draws against probabilities."""
+"""Sampling of actions: probabilities match plain Python, and frequencies match probabilities."""
 
 from collections import Counter
 from dataclasses import replace

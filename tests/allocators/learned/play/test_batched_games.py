@@ -1,4 +1,4 @@
-"""Compiled games: the same network, the same moves and the same best positions as by torch."""
+"""Compiled games have the same scores, moves and best positions as games in torch."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""How large an instance may be, by numbers."""
+"""Limits on the size of instances."""
 
 import numpy as np
 import pytest

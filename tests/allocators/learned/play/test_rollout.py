@@ -1,4 +1,4 @@
-"""Rollouts: incremental scores equal full ones, and the best position on the way is what comes back."""
+"""Rollouts: incremental scores equal full ones, and the best position of a game is returned."""
 
 from collections.abc import Callable
 from dataclasses import replace

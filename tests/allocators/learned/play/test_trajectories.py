@@ -1,4 +1,4 @@
-"""Trajectories: advantages against their definition, and games that are written down as they were played."""
+"""Trajectories: advantages match their definition, and games are recorded as played."""
 
 from math import prod
 

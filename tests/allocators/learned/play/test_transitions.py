@@ -1,4 +1,4 @@
-"""Rounds taken task_distance into single moves, and the memory of them."""
+"""Rounds split into single moves, and the buffer of these."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Learning on: when it happens, what it learns from, and that shipped networks stay as they are."""
+"""Fine-tuning: when it happens, what it learns from, and that shipped networks are not modified."""
 
 from itertools import permutations
 

@@ -1,4 +1,4 @@
-"""Partitions into regions, by distance in space or by the ways that agents can go."""
+"""Partitions into regions, by distance or by reachability."""
 
 import numpy as np
 import pytest
@@ -105,7 +105,7 @@ def test_graph_is_used_only_for_shortfalls() -> None:
     assert partition(place, np.array([0.0, 0, -1, 0]), 2, np.random.default_rng(0), graph=alone).tolist() == [[2, 3]]
 
 
-def test_edges_lead_to_agents_that_can_take_the_task() -> None:
+def test_edges_lead_to_tasks_whose_agents_can_take_the_task() -> None:
     """Edges lead to tasks whose agents can also take this one; idle agents and those of the task itself have none."""
     instance = Instance(
         ability=[1, 1, 1, 1],

@@ -1,4 +1,4 @@
-"""The curriculum: games of every kind are sound, grow with progress, and come again from the same generator."""
+"""The curriculum: games of every kind are valid, grow with progress, and are reproducible by seed."""
 
 from dataclasses import fields, replace
 

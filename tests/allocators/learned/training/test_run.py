@@ -1,4 +1,4 @@
-"""Training as a function: the same policy as by the command, and mistakes told before anything is written."""
+"""Training as a function: the same policy as by the command, and errors before anything is written."""
 
 import json
 import subprocess

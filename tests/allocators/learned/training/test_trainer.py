@@ -1,4 +1,4 @@
-"""Training: resumes to the same curve on any engine, keeps the best, stops in time, and leaves whole files."""
+"""Training: resumes to the same curve on any engine, keeps the best, stops in time, and leaves complete files."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, replace

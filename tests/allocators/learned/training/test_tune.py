@@ -1,4 +1,4 @@
-"""Tuning: begins with the defaults, goes on where it stopped, and ends hopeless trials early."""
+"""Tuning: begins with the defaults, can be resumed, and ends hopeless trials early."""
 
 import sys
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""Validation: the figures are those of the plans that the policy makes, by the one scorer."""
+"""Validation: the figures are those of `evaluate` for the plans of the policy."""
 
 from dataclasses import replace
 

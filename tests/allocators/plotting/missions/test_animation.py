@@ -1,4 +1,4 @@
-"""What single pictures of a film show."""
+"""Single frames of a film."""
 
 import numpy as np
 from matplotlib.figure import Figure

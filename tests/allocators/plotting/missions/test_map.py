@@ -1,4 +1,4 @@
-"""The map of a mission: names that are beside the places and within the map."""
+"""The map of a mission: labels are next to their positions and within the map."""
 
 import numpy as np
 from matplotlib.figure import Figure

@@ -1,4 +1,4 @@
-"""The page that plays a mission: what is in it, and that it plays in a browser."""
+"""The page that plays a mission: its contents, and that it plays in a browser."""
 
 import re
 from pathlib import Path
