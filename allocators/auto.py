@@ -3,7 +3,7 @@
 Exact methods alternate local search with their own searches and bounds, so the choice only decides how the time is
 divided. The threshold was measured on two cores. For the makespan, exact methods pay off as long as the solver's model
 can be built in time, at 60,000 pairs per second. For the energy, they match pure local search up to the threshold, and
-prove a third of its gap; beyond, they lost up to 3 % of energy on some instances.
+leave a third of its gap; beyond, their plans took up to 3 % more energy on some instances.
 """
 
 from alloc.allocators.contract.budget import Budget

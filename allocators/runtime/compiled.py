@@ -64,8 +64,8 @@ def compiled(function: Function) -> Function:
 def compiled_in_place(function: Function) -> Function:
     """Compile `function` as `compiled` does, without reference counting; it must not allocate arrays.
 
-    Division by zero is not checked. Without reference counting, missions, whose many small functions pass many arrays,
-    take less than half of the time.
+    Division by zero gives infinity or NaN, not an error. Without reference counting, missions, whose many small
+    functions pass many arrays, take less than half of the time.
     """
     return _compiled_once(_cached(function, **_IN_PLACE))
 

@@ -31,7 +31,7 @@
 """Hours of travel, until it is done with the agent and without; whether it is the last order, and work goes on there;
 others there or coming, none; the agent's ability and its hours for the work; whether others end before it arrives; age
 of what is known; share of the time that would be work; other work near by; hours gained; priority; hours before the
-deadline, which it misses; growth; energy; agents without a task that are nearer; whether the option is to look around,
+deadline, which it misses; growth; energy; agents without a task that are nearer; whether the option is to explore,
 or to stay; how long a place was not seen; and of the whole situation: known tasks per agent, agents, work of all."""
 
 FEATURES = 26

@@ -44,7 +44,7 @@ class NetworkParameters(CheckedParameters):
 
 
 class NetworkPolicy(Policy):
-    """Each agent takes the option that the network scores highest: a task, looking around, or staying.
+    """Each agent takes the option that the network scores highest: a task, exploring, or staying.
 
     Parameters
     ----------
