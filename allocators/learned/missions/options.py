@@ -207,7 +207,8 @@ def fill_task(situation: Situation, j: int, option: Singles, idle: int, scale: f
     growth = task[known.GROWTH, j]
     option[names.GROWTH] = squashed(growth, own[known.ABILITY]) if growth > 0 else 0.0
     energy = own[known.ENERGY_PER_DISTANCE] * distance
-    option[names.ENERGY] = min(energy / own[known.BATTERY], 1.0) if energy > 0 else 0.0
+    battery = own[known.BATTERY]  # an empty one may be below 0 by a rounding error
+    option[names.ENERGY] = 0.0 if energy <= 0 else min(energy / battery, 1.0) if battery > 0 else 1.0
     option[names.RIVALS] = squashed_count(rivals(situation, j, distance, idle))
 
 

@@ -110,8 +110,10 @@ def serve(lines: "Lines") -> None:
             for number, line in enumerate(iter(arrived.get, None), 1):
                 write_out(json.dumps(lines.answer(line, number), allow_nan=False) + "\n")
         finally:  # also if an answer cannot be written
-            lines.save()
-            lines.close()
+            try:
+                lines.save()
+            finally:
+                lines.close()
 
 
 def read_lines(arrived: "SimpleQueue[str | None]") -> None:
