@@ -5,7 +5,7 @@ import os
 import signal
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from types import FrameType
 from typing import TypeVar
@@ -13,6 +13,10 @@ from typing import TypeVar
 from alloc.problems import AllocError
 
 Answer = TypeVar("Answer")
+Handler = Callable[[int, FrameType | None], object]
+
+ENDING = (signal.SIGINT, signal.SIGTERM)
+"""Signals that ask a run to end."""
 
 POLL_S = 0.01
 GRACE_S = 0.3
@@ -70,46 +74,49 @@ def raise_if_cancelled(stop: threading.Event) -> None:
 
 
 @contextmanager
-def signals_set(stop: threading.Event) -> Iterator[None]:
-    """Let SIGINT and SIGTERM set `stop` while the block runs; outside the main thread, do nothing.
+def signals_handled(numbers: Sequence[signal.Signals], handler: Handler) -> Iterator[None]:
+    """Handle signals while the block runs; outside the main thread, do nothing.
 
-    A second signal has its previous effect, so that a hanging run can still be ended. Handlers that an embedding
-    program has set in C are kept, as they could not be restored.
+    Handlers that an embedding program has set in C are kept, as they could not be restored.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
-    before = {number: handler for number, handler in handlers.items() if handler is not None}
+    before = {number: known for number in numbers if (known := signal.getsignal(number)) is not None}
+    for number in before:
+        signal.signal(number, handler)
+    try:
+        yield
+    finally:
+        for number, known in before.items():
+            signal.signal(number, known)
+
+
+@contextmanager
+def signals_set(stop: threading.Event) -> Iterator[None]:
+    """Let SIGINT and SIGTERM set `stop` while the block runs, as `signals_handled` does.
+
+    A second signal has its previous effect, so that a hanging run can still be ended.
+    """
+    before = {number: signal.getsignal(number) for number in ENDING}
 
     def request_stop(number: int, frame: FrameType | None) -> None:
         stop.set()
         signal.signal(number, before[signal.Signals(number)])
 
-    for number in before:
-        signal.signal(number, request_stop)
-    try:
+    with signals_handled(ENDING, request_stop):
         yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
 
 
 @contextmanager
 def sigterm_interrupts() -> Iterator[None]:
-    """Let SIGTERM raise `KeyboardInterrupt`, as Ctrl-C does, while the block runs; only in the main thread."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
+    """Let SIGTERM raise `KeyboardInterrupt`, as Ctrl-C does, while the block runs, as `signals_handled` does."""
 
     def interrupt(_number: int, _frame: FrameType | None) -> None:
         raise KeyboardInterrupt
 
-    before = signal.signal(signal.SIGTERM, interrupt)
-    try:
+    with signals_handled((signal.SIGTERM,), interrupt):
         yield
-    finally:
-        signal.signal(signal.SIGTERM, before)
 
 
 def run_native(work: Callable[[], Answer], should_stop: Callable[[], bool], halt: Callable[[], None]) -> Answer | None:

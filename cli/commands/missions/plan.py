@@ -2,7 +2,6 @@
 
 import contextlib
 import json
-import signal
 import sys
 import threading
 from collections.abc import Callable, Iterator
@@ -139,18 +138,11 @@ def ended_by_signals(arrived: "SimpleQueue[str | None]", end: Callable[[], objec
 
     They also call `end`.
     """
+    from alloc.allocators.runtime.interrupts import ENDING, signals_handled
 
     def request_end(number: int, frame: FrameType | None) -> None:
         end()
         arrived.put(None)
 
-    if threading.current_thread() is not threading.main_thread():
+    with signals_handled(ENDING, request_end):
         yield
-        return
-    numbers = (signal.SIGTERM, signal.SIGINT)
-    before = [signal.signal(number, request_end) for number in numbers]
-    try:
-        yield
-    finally:
-        for number, handler in zip(numbers, before, strict=True):
-            signal.signal(number, handler)
